@@ -1,0 +1,158 @@
+"""What a method is: it learns in batches, hands out its current policy, and can be saved and put back.
+
+Shapes: `B` batch (may be absent), `O` observation, `D` design, `C` control, `I` instance.
+A new method is one file in `methods/` with one public subclass of `Method`. The runner owns budget, evaluation,
+checkpoints, seeds and progress; a method only learns.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codesign_bench.episodes import Episodes, Tradeoff
+from codesign_bench.registry import load, names
+from codesign_bench.seeding import Streams
+from codesign_bench.task import Floats, Singles, Task
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What a method is asked to learn: a task, perhaps with a cutout of its instances and the trade-off reward."""
+
+    task: Task
+    cutout: float = 0.0
+    """Fraction of the training region whose instances are never trained on."""
+    tradeoff: Tradeoff | None = None
+    instance: tuple[float, ...] | None = None
+    """The one instance to train on (fine-tuning), or None for all of them."""
+
+    def make_episodes(self, num_slots: int) -> Episodes:
+        """Return a batch of `num_slots` episodes of the task."""
+        return Episodes(self.task, num_slots, self.tradeoff)
+
+    def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
+        """Return (count, I) training instances: none from the cutout region."""
+        if self.instance is not None:
+            return np.tile(np.array(self.instance, dtype=np.float64), (count, 1))
+        instances = self.task.sample_instances(rng, count)
+        if self.cutout > 0.0:
+            excluded = self.task.in_cutout(instances, self.cutout)
+            while excluded.any():
+                instances[excluded] = self.task.sample_instances(rng, int(excluded.sum()))
+                excluded = self.task.in_cutout(instances, self.cutout)
+        return instances
+
+
+class Policy(ABC):
+    """A designer and a controller that act with their means; what evaluation, rendering, export and deployment share."""
+
+    @abstractmethod
+    def design(self, observation: Singles) -> Singles:
+        """Return the design (D,) or (B, D) in [-1, 1] for an observation (O,) or (B, O) of the design phase."""
+
+    @abstractmethod
+    def act(self, observation: Singles) -> Singles:
+        """Return the control (C,) or (B, C) in [-1, 1] for an observation (O,) or (B, O) of the control phase."""
+
+    @abstractmethod
+    def tensors(self) -> dict[str, Array]:
+        """Return all numbers that the policy needs, by name; `Method.make_policy` takes them back."""
+
+
+@dataclass
+class State:
+    """All that a method needs to go on exactly where it stood: arrays by name, and JSON values."""
+
+    arrays: dict[str, Array]
+    values: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class BatchReport:
+    """What one `Method.train` call did."""
+
+    env_steps: int
+    """Simulated environment steps, design steps and every candidate's included."""
+    metrics: dict[str, float]
+    """Logged values by name, each explained on the method's page."""
+
+
+ConfigType = TypeVar("ConfigType")
+
+
+class Method(ABC, Generic[ConfigType]):
+    """A way of learning a tool's design together with its control, from task reward alone."""
+
+    name: ClassVar[str]
+    """Its name, which is its file's name."""
+    label: ClassVar[str]
+    """Its name in figures."""
+    config_class: ClassVar[type]
+    """Frozen dataclass of its hyperparameters; each field's default is total, so that any task runs with it."""
+
+    def __init__(self, problem: Problem, config: ConfigType, streams: Streams) -> None:
+        self.problem = problem
+        self.config = config
+        self.streams = streams
+
+    @classmethod
+    @abstractmethod
+    def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
+        """Return what `profile` sets for the task: key -> (value, source). Unknown tasks get the profile's general values."""
+
+    @abstractmethod
+    def train(self, remaining_steps: int) -> BatchReport:
+        """Collect one batch and learn from it.
+
+        Args:
+            remaining_steps: environment steps left in the budget; the batch is the smallest number of whole episodes
+                that is not below min(batch size, remaining steps).
+        """
+
+    @abstractmethod
+    def policy(self) -> Policy:
+        """Return the policy as it stands; later training may change it."""
+
+    @classmethod
+    @abstractmethod
+    def make_policy(cls, task: Task, config: ConfigType, tensors: Mapping[str, Array]) -> Policy:
+        """Return the policy that `Policy.tensors` described."""
+
+    @abstractmethod
+    def state(self) -> State:
+        """Return what `load_state` needs to go on bit for bit; the runner saves the random streams."""
+
+    @abstractmethod
+    def load_state(self, state: State) -> None:
+        """Go on from `state`; called on a freshly built method with the same problem, config and seed."""
+
+    def warm_start(self, tensors: Mapping[str, Array]) -> None:
+        """Start from a trained policy's tensors (fine-tuning).
+
+        Raises:
+            NotImplementedError: the method cannot.
+        """
+        raise NotImplementedError(f"{self.name} cannot start from a trained policy")
+
+
+def method_names() -> tuple[str, ...]:
+    """Return the names of all methods, built-in and third-party."""
+    return names("methods")
+
+
+def load_method(name: str) -> type[Method[Any]]:
+    """Return the class of the method `name`.
+
+    Raises:
+        UserError: there is no such method.
+    """
+    method: type[Method[Any]] = load("methods", name, Method)
+    return method

@@ -1,0 +1,152 @@
+"""The Gymnasium environments: they keep Gymnasium's rules, and the batched one goes as the single one does."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import warnings
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+from codesign_bench.envs import ToolEnv, environment_id, register_environments
+from codesign_bench.task import load_task, task_names
+
+register_environments()
+EVERY_TASK = pytest.mark.parametrize("task_name", task_names())
+
+
+def play(env: Any, actions: np.ndarray) -> list[tuple[np.ndarray, float, bool, bool, dict[str, Any]]]:
+    """Take `actions` in a single environment, resetting after an episode's end as the vector environment does."""
+    steps: list[tuple[np.ndarray, float, bool, bool, dict[str, Any]]] = []
+    for action in actions:
+        if steps and (steps[-1][2] or steps[-1][3]):
+            steps.append((env.reset()[0], 0.0, False, False, {}))
+        else:
+            steps.append(env.step(action))
+    return steps
+
+
+@pytest.mark.parametrize(
+    ("name", "identifier"), [("push", "Push"), ("catch_balls", "CatchBalls"), ("scoop_3d", "Scoop3D")]
+)
+def test_ids_follow_the_task_names(name: str, identifier: str) -> None:
+    assert environment_id(name) == f"codesign_bench/{identifier}-v0"
+
+
+@EVERY_TASK
+def test_gymnasium_has_nothing_to_complain_about(task_name: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gymnasium.make(environment_id(task_name))
+        check_env(env.unwrapped, skip_render_check=True)
+
+
+@EVERY_TASK
+def test_an_episode_is_one_design_step_and_then_control_until_the_horizon(task_name: str) -> None:
+    env = ToolEnv(task_name)
+    task = env.task
+    layout = task.layout
+    observation, _ = env.reset(seed=3)
+    assert observation[layout.phase].tolist() == [1.0, 0.0, 0.0]
+    assert not observation[layout.design].any()
+
+    action = np.full(env.action_space.shape, 0.25, dtype=np.float32)
+    observation, reward, terminated, truncated, info = env.step(action)
+    assert (reward, terminated, truncated, info) == (0.0, False, False, {})
+    assert observation[layout.phase].tolist() == [0.0, 1.0, 0.0]
+    np.testing.assert_array_equal(observation[layout.design], np.float32(0.25))
+
+    length = 0
+    while not (terminated or truncated):
+        assert info == {}
+        observation, reward, terminated, truncated, info = env.step(0.0 * action)
+        length += 1
+        assert observation in env.observation_space
+    assert length <= task.horizon
+    assert truncated is (length == task.horizon and not terminated)
+    assert isinstance(info["success"], bool)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(action)
+
+
+@EVERY_TASK
+def test_the_design_step_ignores_the_control_part_and_the_other_way_round(task_name: str) -> None:
+    env = ToolEnv(task_name)
+    size = env.task.design_space.size
+    rng = np.random.default_rng(0)
+    first, second = (rng.uniform(-1, 1, (20, *env.action_space.shape)).astype(np.float32) for _ in range(2))
+    second[0, :size] = first[0, :size]
+    second[1:, size:] = first[1:, size:]
+    rollouts = []
+    for actions in (first, second):
+        env.reset(seed=0)
+        rollouts.append([step[0] for step in play(env, actions)])
+    np.testing.assert_array_equal(rollouts[0], rollouts[1])
+
+
+@EVERY_TASK
+def test_every_environment_of_a_batch_goes_as_it_does_alone(task_name: str) -> None:
+    count, length = 3, load_task(task_name).horizon + 20
+    envs = gymnasium.make_vec(environment_id(task_name), num_envs=count)
+    assert envs.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    actions = np.random.default_rng(1).uniform(-1, 1, (length, *envs.action_space.shape)).astype(np.float32)
+    start, _ = envs.reset(seed=7)
+    batched = [envs.step(action) for action in actions]
+    for index in range(count):
+        env = ToolEnv(task_name)
+        np.testing.assert_array_equal(start[index], env.reset(seed=7 + index)[0])
+        for together, alone in zip(batched, play(env, actions[:, index]), strict=True):
+            np.testing.assert_array_equal(together[0][index], alone[0])
+            assert [part[index] for part in together[1:4]] == list(alone[1:4])
+            info = together[4]
+            assert bool(info.get("_success", np.zeros(count, bool))[index]) is ("success" in alone[4])
+            assert bool(info.get("success", np.zeros(count, bool))[index]) is alone[4].get("success", False)
+    assert any("success" in step[4] for step in batched), "no episode ended: the test shows nothing"
+
+
+@EVERY_TASK
+def test_an_instance_can_be_asked_for(task_name: str) -> None:
+    task = load_task(task_name)
+    instances = task.evaluation_instances()[:2]
+    goals = instances[:, : task.goal_size].astype(np.float32)
+    alone, _ = ToolEnv(task_name).reset(options={"instance": instances[1]})
+    np.testing.assert_array_equal(alone[task.layout.goal], goals[1])
+    envs = gymnasium.make_vec(environment_id(task_name), num_envs=2)
+    together, _ = envs.reset(options={"instance": instances})
+    np.testing.assert_array_equal(together[:, task.layout.goal], goals)
+    with pytest.raises(ValueError, match="instance"):
+        envs.reset(options={"instance": np.zeros(task.instance_space.size + 1)})
+
+
+@EVERY_TASK
+def test_a_reset_can_be_limited_to_some_environments(task_name: str) -> None:
+    envs = gymnasium.make_vec(environment_id(task_name), num_envs=2)
+    envs.reset(seed=0)
+    before, *_ = envs.step(envs.action_space.sample())
+    after, _ = envs.reset(seed=[None, 5], options={"reset_mask": np.array([False, True])})
+    np.testing.assert_array_equal(after[0], before[0])
+    np.testing.assert_array_equal(after[1], ToolEnv(task_name).reset(seed=5)[0])
+
+
+@EVERY_TASK
+def test_values_that_are_not_finite_are_refused(task_name: str) -> None:
+    env = ToolEnv(task_name)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="finite"):
+        env.step(np.full(env.action_space.shape, np.nan, dtype=np.float32))
+
+
+def test_listing_environments_loads_neither_torch_nor_simulators() -> None:
+    code = (
+        "import sys, gymnasium, codesign_bench.envs as envs; envs.register_environments();"
+        "assert any(name.startswith('codesign_bench/') for name in gymnasium.registry);"
+        "loaded = {name.split('.')[0] for name in sys.modules};"
+        "sys.exit(str(loaded & {'torch', 'pybullet', 'pymunk'}) if loaded & {'torch', 'pybullet', 'pymunk'} else 0)"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert result.returncode == 0, result.stderr

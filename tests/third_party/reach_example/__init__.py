@@ -1,0 +1,1 @@
+"""A task and a method that live outside codesign-bench: one file each."""

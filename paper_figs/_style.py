@@ -1,0 +1,85 @@
+"""How every figure looks: fixed colours, sizes for a two-column paper, and a backend that needs no display.
+
+Colours are those of Okabe and Ito (2008), which readers with any common colour blindness can tell apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any, Literal
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+Dashes = Literal["-", "--", "-."]
+
+COLOURS = {
+    "gnn_ppo": "#0072B2",
+    "shared_arch": "#E69F00",
+    "cma_rl": "#009E73",
+    "hwasp_minimal": "#D55E00",
+    "cma_es": "#CC79A7",
+}
+"""Colour of each of the paper's five methods, in the order of its legends."""
+
+OTHER_COLOURS = ("#56B4E9", "#000000", "#999999")
+"""Colours of third-party methods, in turn; where they run out, the dashes change."""
+
+DASHES: tuple[Dashes, ...] = ("-", "--", "-.")
+
+COLUMN_WIDTH = 3.4
+"""Width of one column, in inches."""
+PAGE_WIDTH = 7.0
+"""Width of both columns, in inches."""
+BAND_OPACITY = 0.2
+
+SETTINGS = {
+    "font.size": 7,
+    "axes.titlesize": 8,
+    "axes.labelsize": 7,
+    "legend.fontsize": 7,
+    "xtick.labelsize": 6,
+    "ytick.labelsize": 6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "grid.linewidth": 0.5,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.2,
+    "legend.frameon": False,
+    "savefig.dpi": 250,
+    "figure.dpi": 250,
+    "pdf.fonttype": 42,
+}
+"""Matplotlib settings of all figures; font type 42 keeps the text of a PDF searchable."""
+
+
+def in_order(methods: Iterable[str]) -> list[str]:
+    """Return the methods in the order of legends: the paper's five first, then all others by name."""
+    present = set(methods)
+    return [name for name in COLOURS if name in present] + sorted(present - set(COLOURS))
+
+
+def line_styles(methods: Iterable[str]) -> dict[str, tuple[str, Dashes]]:
+    """Return (colour, dashes) for each method; those of the paper's five never depend on what else is drawn."""
+    styles: dict[str, tuple[str, Dashes]] = {}
+    others = 0
+    for name in in_order(methods):
+        if name in COLOURS:
+            styles[name] = (COLOURS[name], DASHES[0])
+        else:
+            turn, index = divmod(others, len(OTHER_COLOURS))
+            styles[name] = (OTHER_COLOURS[index], DASHES[turn % len(DASHES)])
+            others += 1
+    return styles
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Draw with the settings of this module, whatever the user's own are."""
+    settings: dict[Any, Any] = {**mpl.rcParamsDefault, **SETTINGS, "backend": "Agg"}
+    with mpl.rc_context(settings):
+        yield

@@ -1,0 +1,115 @@
+"""Who may import whom, and that the packages listed for installation are the folders on disk."""
+
+from __future__ import annotations
+
+import ast
+import configparser
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+FLAT_FOLDERS = ("methods", "tasks", "paper_figs")
+"""Folders whose every file is one entry."""
+
+CORE = sorted((ROOT / "codesign_bench").rglob("*.py"))
+LEARNING = ROOT / "codesign_bench" / "learning"
+
+
+def files(folder: str) -> list[Path]:
+    """Return the Python files of a top-level folder."""
+    return sorted((ROOT / folder).rglob("*.py"))
+
+
+def imported(path: Path, nodes: str = "all") -> Iterator[str]:
+    """Yield the full names of the modules that a file imports; with `nodes="top"`, only when it is imported itself.
+
+    A module of `methods/` counts as `codesign_bench.methods.<file>` and so on, as it does once installed.
+    """
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    package = package_of(path)
+    for node in ast.walk(tree) if nodes == "all" else tree.body:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            yield module
+            yield from (f"{module}.{alias.name}" for alias in node.names)
+
+
+def package_of(path: Path) -> str:
+    """Return the package that a file belongs to once installed."""
+    folders = path.parent.relative_to(ROOT).parts
+    return ".".join(folders if folders[0] == "codesign_bench" else ("codesign_bench", *folders))
+
+
+def offences(paths: list[Path], forbidden: tuple[str, ...]) -> list[str]:
+    """Return "file imports module" for each import of a forbidden module or of anything below one."""
+    return [
+        f"{path.relative_to(ROOT)} imports {module}"
+        for path in paths
+        for module in imported(path)
+        if any(module == name or module.startswith(f"{name}.") for name in forbidden)
+    ]
+
+
+def below(*names: str) -> tuple[str, ...]:
+    """Return the names, seen as parts of the installed package."""
+    return tuple(f"codesign_bench.{name}" for name in names)
+
+
+def test_the_core_knows_no_method_task_or_figure() -> None:
+    assert offences(CORE, (*below(*FLAT_FOLDERS), *FLAT_FOLDERS)) == []
+
+
+def test_methods_know_no_task_and_no_figure() -> None:
+    assert offences(files("methods"), below("tasks", "paper_figs", "runner", "results", "cli")) == []
+
+
+def test_tasks_know_no_method_and_nothing_of_learning() -> None:
+    forbidden = (*below("methods", "paper_figs", "learning", "method", "runner", "results", "cli"), "torch", "cma")
+    assert offences(files("tasks"), forbidden) == []
+
+
+def test_figures_are_drawn_from_results_alone() -> None:
+    allowed = {"codesign_bench", "numpy", "pandas", "matplotlib", "scipy", *sys.stdlib_module_names}
+    modules = {module for path in files("paper_figs") for module in imported(path)}
+    assert {module.split(".")[0] for module in modules} <= allowed
+    assert offences(files("paper_figs"), below("methods", "tasks", "method", "task", "learning", "runner")) == []
+
+
+def test_what_is_shared_by_methods_knows_neither_results_nor_running() -> None:
+    shared = sorted(LEARNING.rglob("*.py"))
+    assert offences(shared, below("runner", "results", "cli", "checkpoint", "evaluate", "progress")) == []
+
+
+@pytest.mark.parametrize("folder", FLAT_FOLDERS)
+def test_a_folder_of_entries_is_flat(folder: str) -> None:
+    nested = [path for path in files(folder) if path.parent != ROOT / folder]
+    assert nested == []
+
+
+def test_modules_of_the_package_are_not_imported_by_their_folder_name() -> None:
+    everywhere = [path for folder in ("codesign_bench", *FLAT_FOLDERS, "tests") for path in files(folder)]
+    assert offences(everywhere, FLAT_FOLDERS) == []
+
+
+def test_the_listed_packages_are_the_folders_on_disk() -> None:
+    setup = configparser.ConfigParser()
+    setup.read(ROOT / "setup.cfg")
+    listed = set(setup["options"]["packages"].split())
+    on_disk = {package_of(path) for path in (*CORE, *(path for folder in FLAT_FOLDERS for path in files(folder)))}
+    assert listed == on_disk
+    mapped = dict(line.split(" = ") for line in setup["options"]["package_dir"].strip().splitlines())
+    assert mapped == {f"codesign_bench.{folder}": folder for folder in FLAT_FOLDERS}
+
+
+def test_the_command_line_starts_without_heavy_imports() -> None:
+    light = ("registry", "errors", "task", "episodes", "method", "envs", "seeding", "__init__")
+    heavy = {"torch", "pybullet", "pymunk", "cma"}
+    for name in light:
+        top = {module.split(".")[0] for module in imported(ROOT / "codesign_bench" / f"{name}.py", nodes="top")}
+        assert not top & heavy, name

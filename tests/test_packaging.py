@@ -1,0 +1,94 @@
+"""What pip installs is complete: the wheel, alone and outside the checkout, lists what the checkout lists."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+LEFT_OUT = shutil.ignore_patterns(".*", "*.egg-info", "build", "dist", "__pycache__", "runs", "figures")
+
+
+def run(*arguments: str, folder: Path, path: Path | None = None) -> str:
+    """Run Python with `arguments` in `folder` and return its output; `path` is searched for modules first."""
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    if path is not None:
+        environment["PYTHONPATH"] = str(path)
+    command = [sys.executable, *arguments]
+    result = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a clean copy of the checkout: building leaves files behind that must not reach the next build."""
+    copy = tmp_path_factory.mktemp("a copy") / "codesign-bench"
+    shutil.copytree(ROOT, copy, ignore=LEFT_OUT)
+    return copy
+
+
+@pytest.fixture(scope="module")
+def installed(checkout: Path) -> Path:
+    """Return a folder into which a wheel built from the copy is installed, without its dependencies."""
+    target = checkout.parent / "installed"
+    options = ("--no-deps", "--no-build-isolation", "--quiet", "--target", str(target))
+    run("-m", "pip", "install", *options, str(checkout), folder=checkout.parent)
+    return target
+
+
+def modules(folder: Path) -> set[str]:
+    """Return the Python files below a folder, as paths relative to it."""
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*.py")}
+
+
+def test_the_installed_package_holds_every_module(installed: Path) -> None:
+    expected = {f"codesign_bench/{name}" for name in modules(ROOT / "codesign_bench")}
+    for folder in ("methods", "tasks", "paper_figs"):
+        expected |= {f"codesign_bench/{folder}/{name}" for name in modules(ROOT / folder)}
+    assert modules(installed / "codesign_bench") == {name.removeprefix("codesign_bench/") for name in expected}
+    assert (installed / "codesign_bench" / "py.typed").is_file()
+
+
+def test_nothing_lands_beside_the_package(installed: Path) -> None:
+    names = {path.name for path in installed.iterdir() if not path.name.endswith(".dist-info")}
+    assert names <= {"codesign_bench", "bin"}
+
+
+def test_the_command_works_outside_the_checkout(installed: Path, tmp_path: Path) -> None:
+    where = run("-c", "import codesign_bench; print(codesign_bench.__file__)", folder=tmp_path, path=installed)
+    assert Path(where.strip()).is_relative_to(installed), "the checkout was tested, not what is installed"
+    listing = run("-m", "codesign_bench", "list", folder=tmp_path, path=installed)
+    for folder in ("methods", "tasks", "paper_figs"):
+        for name in (path.stem for path in (ROOT / folder).glob("[a-z]*.py")):
+            assert name in listing
+
+
+@pytest.mark.slow
+def test_the_source_archive_builds_the_same_wheel(checkout: Path) -> None:
+    pytest.importorskip("build")
+    run("-m", "build", "--no-isolation", "--outdir", "dist", ".", folder=checkout)
+    (archive,) = (checkout / "dist").glob("*.tar.gz")
+    (wheel,) = (checkout / "dist").glob("*.whl")
+    with tarfile.open(archive) as content:
+        names = {name.split("/", 1)[-1] for name in content.getnames()}
+    for expected in (
+        "tests/test_packaging.py",
+        "tests/third_party/setup.cfg",
+        "Makefile",
+        "constraints.txt",
+        "LICENSE",
+    ):
+        assert expected in names
+    with zipfile.ZipFile(wheel) as content:
+        tops = {name.split("/")[0] for name in content.namelist()}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"codesign_bench"}

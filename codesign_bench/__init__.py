@@ -1,0 +1,52 @@
+"""codesign-bench: which way of learning a tool's design together with its control works best, and how sure are we?
+
+Importing it imports no method, no simulator and no torch; names are resolved when they are used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from codesign_bench.errors import UserError
+    from codesign_bench.method import load_method, method_names
+    from codesign_bench.policy_files import load_policy
+    from codesign_bench.results import load_results
+    from codesign_bench.task import load_task, task_names
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "UserError": "errors",
+    "load_method": "method",
+    "load_policy": "policy_files",
+    "load_results": "results",
+    "load_task": "task",
+    "method_names": "method",
+    "task_names": "task",
+}
+
+__all__ = [
+    "UserError",
+    "__version__",
+    "load_method",
+    "load_policy",
+    "load_results",
+    "load_task",
+    "method_names",
+    "task_names",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
+
+import_module(f"{__name__}.envs").register_environments()

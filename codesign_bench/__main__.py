@@ -1,0 +1,8 @@
+"""`python -m codesign_bench` is `codesign-bench`."""
+
+import sys
+
+from codesign_bench.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,63 @@
+"""What a result depends on besides its configuration: the machine and the versions of the packages."""
+
+from __future__ import annotations
+
+import os
+import platform
+import socket
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import joblib
+
+PACKAGES = ("codesign_bench", "numpy", "torch", "pymunk", "pybullet", "cma", "gymnasium")
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+"""What the numerical libraries read when they are first imported."""
+
+
+def available_cores() -> int:
+    """Return how many cores this process may use: its affinity and its container's quota count."""
+    return int(joblib.cpu_count())
+
+
+def thread_environment(threads: int) -> dict[str, str]:
+    """Return this process's environment with the numerical libraries pinned to `threads`."""
+    return {**os.environ, **dict.fromkeys(THREAD_VARIABLES, str(threads))}
+
+
+def package_versions() -> dict[str, str | None]:
+    """Return Python's version and those of the packages, without importing any; None is not installed."""
+    found: dict[str, str | None] = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = None
+    return found
+
+
+def host_facts(threads: int) -> dict[str, Any]:
+    """Return the machine's name, system, processor and cores, and the threads of one cell."""
+    return {
+        "name": socket.gethostname(),
+        "system": platform.platform(),
+        "cpu": _processor(),
+        "cores": available_cores(),
+        "threads": threads,
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()

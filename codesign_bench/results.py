@@ -1,0 +1,164 @@
+"""Results on disk: the names of files and columns, and reading them all as one tidy frame.
+
+OUT/codesign-bench.json                                  marks the folder as ours
+OUT/<task>/<method>/<variant>/seed-00/cell.json          status, configuration with sources, versions, host, timings
+                                     /curve.csv          one row per evaluation
+                                     /metrics.csv        the method's own metrics, averaged between evaluations
+                                     /evaluation.csv     each evaluation instance at the end: design, return, success
+                                     /policy.safetensors final networks
+                                     /checkpoint.safetensors, progress.json, cell.lock, output.log   while it runs
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import filelock
+import pandas as pd
+
+from codesign_bench.errors import UserError
+from codesign_bench.files import write_bytes, write_json
+
+MARKER_FILE = "codesign-bench.json"
+CELL_FILE = "cell.json"
+CURVE_FILE = "curve.csv"
+METRICS_FILE = "metrics.csv"
+EVALUATION_FILE = "evaluation.csv"
+POLICY_FILE = "policy.safetensors"
+CHECKPOINT_FILE = "checkpoint.safetensors"
+PROGRESS_FILE = "progress.json"
+LOCK_FILE = "cell.lock"
+LOG_FILE = "output.log"
+
+CELL_PATTERN = f"*/*/*/seed-*/{CELL_FILE}"
+SCHEMA = 1
+
+CURVE_COLUMNS = ("env_steps", "wall_s", "return_mean", "return_se", "success_rate", "episode_length")
+CELL_COLUMNS = ("task", "method", "variant", "cutout", "alpha", "seed")
+LABEL_COLUMN = "label"
+"""The method's name in figures, added beside the columns that tell the cell."""
+
+RUNNING, DONE, FAILED = "running", "done", "failed"
+INTERRUPTED = "interrupted"
+"""Not stored: a cell that says it is running while no process holds its lock."""
+
+
+def read_cell(folder: Path) -> dict[str, Any] | None:
+    """Return the content of the cell file in `folder`, or None when there is none.
+
+    Raises:
+        UserError: it is none of ours, or damaged.
+    """
+    path = folder / CELL_FILE
+    try:
+        content = json.loads(path.read_text())
+        if content["status"] not in (RUNNING, DONE, FAILED) or not isinstance(content["config"], dict):
+            raise ValueError("unknown status")
+    except FileNotFoundError:
+        return None
+    except (ValueError, KeyError, TypeError, OSError) as error:
+        raise UserError(f"cannot read {path} ({error}); delete its folder to start the cell again") from error
+    return dict(content)
+
+
+def write_cell(folder: Path, content: Mapping[str, Any]) -> None:
+    """Replace the cell file in `folder`."""
+    write_json(folder / CELL_FILE, content)
+
+
+def write_rows(path: Path, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> None:
+    """Replace the CSV file `path` by `rows`; `columns` come first and are there even without rows."""
+    found = dict.fromkeys((*columns, *(name for row in rows for name in row)))
+    frame = pd.DataFrame(list(rows), columns=list(found))
+    write_bytes(path, frame.to_csv(index=False, lineterminator="\n").encode())
+
+
+def cell_lock(folder: Path) -> filelock.BaseFileLock:
+    """Return the lock that the process running the cell in `folder` holds."""
+    return filelock.FileLock(folder / LOCK_FILE)
+
+
+def is_locked(folder: Path) -> bool:
+    """Tell whether some process is running the cell in `folder` now."""
+    if not (folder / LOCK_FILE).exists():
+        return False
+    lock = cell_lock(folder)
+    try:
+        lock.acquire(timeout=0)
+    except filelock.Timeout:
+        return True
+    except OSError:  # a folder that may only be read: nobody runs anything there
+        return False
+    lock.release()
+    return False
+
+
+def cell_status(folder: Path, content: Mapping[str, Any]) -> str:
+    """Return "done", "failed", "running" or "interrupted"."""
+    status = str(content["status"])
+    return INTERRUPTED if status == RUNNING and not is_locked(folder) else status
+
+
+def open_folder(out: Path) -> None:
+    """Make `out` a results folder, or check that it is one.
+
+    Raises:
+        UserError: it cannot be written, or holds something else.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        ours = (out / MARKER_FILE).exists() or any(out.glob(CELL_PATTERN))
+        if not ours and any(out.iterdir()):
+            raise UserError(f"--out {out}: the folder holds other files than results; choose an empty or a new folder")
+        write_json(out / MARKER_FILE, {"schema": SCHEMA, "content": "results of codesign-bench run"})
+    except OSError as error:
+        raise UserError(f"--out {out}: cannot write there ({error.strerror})") from error
+
+
+def find_cells(out: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
+    """Yield folder and cell file of every cell below `out`, in order of path; foreign files are passed over.
+
+    Raises:
+        UserError: there is no such folder.
+    """
+    if not out.is_dir():
+        raise UserError(f"no results folder '{out}'; make one with: codesign-bench run --out {out}")
+    for path in sorted(out.glob(CELL_PATTERN)):
+        try:
+            content = read_cell(path.parent)
+        except UserError:
+            continue
+        if content is not None and all(name in content for name in CELL_COLUMNS):
+            yield path.parent, content
+
+
+def load_results(out: str | Path) -> pd.DataFrame:
+    """Return every evaluation of every cell below `out`, running and failed ones included, as one tidy frame.
+
+    Columns: task, method, variant, cutout, alpha (NaN where absent), seed, label, then those of `curve.csv`.
+
+    Raises:
+        UserError: there is no such folder, or no result in it.
+    """
+    frames = [frame for folder, content in find_cells(Path(out)) if (frame := _read_curve(folder, content)) is not None]
+    if not frames:
+        raise UserError(f"no results in '{out}' yet; make some with: codesign-bench run --out {out}")
+    frame = pd.concat(frames, ignore_index=True)
+    return frame.astype({"cutout": float, "alpha": float, "seed": int, "env_steps": int})
+
+
+def _read_curve(folder: Path, content: Mapping[str, Any]) -> pd.DataFrame | None:
+    try:
+        curve = pd.read_csv(folder / CURVE_FILE)
+    except (OSError, ValueError):  # not evaluated yet, or no table
+        return None
+    if curve.empty or not set(CURVE_COLUMNS) <= set(curve.columns):
+        return None
+    for position, name in enumerate(CELL_COLUMNS):
+        value = content[name]
+        curve.insert(position, name, float("nan") if value is None else value)
+    curve.insert(len(CELL_COLUMNS), LABEL_COLUMN, content.get(LABEL_COLUMN, content["method"]))
+    return curve

@@ -20,9 +20,9 @@ from codesign_bench.task import Floats, Singles, Task
 class Config:
     """Hyperparameters of the search."""
 
-    batch_size: int = 1000
+    batch_size: int = 500
     """Environment steps spent on one candidate."""
-    practice: int = 32
+    practice: int = 16
     """Number of instances that all candidates are judged on, in turn: fresh ones would reward luck."""
     step_size: float = 0.3
     """Standard deviation of a candidate's distance from the best policy, per weight."""
@@ -47,9 +47,9 @@ class RandomSearch(Method[Config]):
         return {}
 
     def train(self, remaining_steps: int) -> BatchReport:
-        """Judge one candidate on whole episodes and keep it if it is the best so far."""
+        """Judge one candidate on whole episodes and keep it if it is the best so far; the first is the start itself."""
         noise = self.streams["candidates"].standard_normal(self.best.shape)
-        candidate = self.best + self.config.step_size * noise
+        candidate = self.best if self.best_return is None else self.best + self.config.step_size * noise
         policy = _LinearPolicy(self.problem.task, candidate)
         env_steps, mean_return = self._judge(policy, min(self.config.batch_size, remaining_steps))
         if self.best_return is None or mean_return > self.best_return:

@@ -15,7 +15,8 @@ import pytest
 
 EXAMPLE = Path(__file__).parent / "third_party"
 IMPORTS = ("--import", "reach_example.reach", "--import", "reach_example.random_search")
-TRAIN = [
+SIZE = ("--seeds", "1", "--steps", "20000", "--set", "evaluations=3", "--jobs", "1")
+TRAIN = ("run", "--task", "reach", "--method", "random_search", *SIZE)
     "run",
     "--task",
     "reach",

@@ -17,20 +17,6 @@ EXAMPLE = Path(__file__).parent / "third_party"
 IMPORTS = ("--import", "reach_example.reach", "--import", "reach_example.random_search")
 SIZE = ("--seeds", "1", "--steps", "20000", "--set", "evaluations=3", "--jobs", "1")
 TRAIN = ("run", "--task", "reach", "--method", "random_search", *SIZE)
-    "run",
-    "--task",
-    "reach",
-    "--method",
-    "random_search",
-    "--seeds",
-    "1",
-    "--steps",
-    "20000",
-    "--set",
-    "evaluations=3",
-    "--jobs",
-    "1",
-]
 CELL = Path("reach/random_search/default/seed-00")
 
 

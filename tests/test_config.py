@@ -1,0 +1,124 @@
+"""Every value of a configuration comes from a named source, and bad values are refused in the user's words."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import pytest
+
+from codesign_bench.config import check_overrides, differences, method_config, parse_value, resolve
+from codesign_bench.errors import UserError
+from codesign_bench.method import Method, load_method
+
+pytestmark = pytest.mark.usefixtures("toy")
+
+
+@pytest.fixture
+def search(toy: None) -> type[Method[Any]]:
+    return load_method("toy_search")
+
+
+def entry(config: Any, part: str, name: str) -> tuple[Any, str]:
+    found = config.as_json()[part][name]
+    return found["value"], found["source"]
+
+
+def test_defaults_come_from_the_dataclass_with_the_source_that_a_field_names(search: type[Method[Any]]) -> None:
+    config = resolve(search, "toy_reach", "laptop")
+    assert entry(config, "method", "episodes") == (4, "default")
+    assert entry(config, "method", "step_size") == (0.3, "toy paper, table 1")
+
+
+def test_a_profile_overrides_defaults_and_the_command_line_overrides_profiles(search: type[Method[Any]]) -> None:
+    config = resolve(search, "toy_reach", "paper")
+    assert entry(config, "method", "episodes") == (8, "toy paper, table 2")
+    assert entry(config, "run", "steps") == (10_000_000, "paper, learning curves")
+    config = resolve(search, "toy_reach", "paper", ["episodes=3", "evaluations=7"], steps=500)
+    assert entry(config, "method", "episodes") == (3, "--set")
+    assert entry(config, "run", "evaluations") == (7, "--set")
+    assert entry(config, "run", "steps") == (500, "--steps")
+    assert (config.run.steps, config.run.evaluations, config.method.episodes) == (500, 7, 3)
+
+
+def test_a_prefix_picks_the_method_or_the_run_settings(search: type[Method[Any]]) -> None:
+    config = resolve(search, "toy_reach", "quick", ["toy_search.episodes=3", "other.episodes=9", "run.steps=40"])
+    assert (config.method.episodes, config.run.steps) == (3, 40)
+
+
+@pytest.mark.parametrize(
+    ("annotation", "text", "value"),
+    [
+        (int, "1_000", 1000),
+        (int, "1e6", 1_000_000),
+        (float, "3e-4", 3e-4),
+        (bool, "False", False),
+        (str, "relu", "relu"),
+        (tuple[int, ...], "256,256", (256, 256)),
+        (tuple[int, ...], "(64)", (64,)),
+        (float | None, "none", None),
+        (float | None, "0.5", 0.5),
+        (Literal["joint", "separate"], "joint", "joint"),
+    ],
+)
+def test_text_becomes_a_value_of_the_fields_type(annotation: Any, text: str, value: Any) -> None:
+    parsed = parse_value(annotation, text)
+    assert parsed == value
+    assert type(parsed) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("override", "named"),
+    [
+        ("episodes=2.5", "a whole number"),
+        ("episodes=many", "a whole number"),
+        ("step_size=wide", "a number"),
+        ("step_size=-1", "step_size must be positive"),
+        ("greedy=perhaps", "true or false"),
+        ("widths=8,wide", "a whole number"),
+        ("steps=0", "steps must be at least 1"),
+        ("evaluations=0", "evaluations must be at least 1"),
+    ],
+)
+def test_a_bad_value_is_the_users_error(search: type[Method[Any]], override: str, named: str) -> None:
+    with pytest.raises(UserError, match=named):
+        resolve(search, "toy_reach", "quick", [override])
+
+
+@pytest.mark.parametrize(
+    ("override", "named"),
+    [
+        ("episode=2", "unknown key 'episode'.*episodes"),
+        ("toy_search.steps=2", "unknown key 'steps'"),
+        ("gnn=2.", "unknown key 'gnn'"),
+        ("other.episodes=2", "'other' is none of the selected methods.*toy_search"),
+        ("episodes", "key=value"),
+        ("=3", "key=value"),
+    ],
+)
+def test_a_key_must_be_known_to_a_selected_method(search: type[Method[Any]], override: str, named: str) -> None:
+    with pytest.raises(UserError, match=named):
+        check_overrides([override], [search])
+
+
+def test_an_unknown_profile_lists_the_profiles(search: type[Method[Any]]) -> None:
+    with pytest.raises(UserError, match="unknown profile 'fast'; choose from: quick, laptop, paper"):
+        resolve(search, "toy_reach", "fast")
+
+
+def test_a_stored_configuration_is_rebuilt_and_compared_by_value(search: type[Method[Any]]) -> None:
+    config = resolve(search, "toy_reach", "quick", ["widths=1,2"])
+    assert method_config(search.config_class, config.as_json()["method"]) == config.method
+    same = resolve(search, "toy_reach", "laptop", ["widths=1,2", "steps=150000", "evaluations=10"])
+    assert differences(config.as_json(), same.as_json()) == []
+    other = resolve(search, "toy_reach", "quick", ["widths=1,3"])
+    assert differences(config.as_json(), other.as_json()) == ["widths: there [1, 2], asked [1, 3]"]
+
+
+def test_every_method_resolves_on_every_profile_and_on_a_task_it_has_never_heard_of() -> None:
+    from codesign_bench.method import method_names
+    from codesign_bench.profiles import PROFILES
+
+    for name in method_names():
+        for profile in PROFILES:
+            parts = resolve(load_method(name), "toy_reach", profile).as_json()
+            assert all(entry["source"] for entries in parts.values() for entry in entries.values())

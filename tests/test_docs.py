@@ -1,0 +1,77 @@
+"""The documentation holds: links lead somewhere, examples are tested code, every logged value is explained."""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import fields, replace
+from pathlib import Path
+
+import pytest
+
+import codesign_bench
+from codesign_bench.config import resolve
+from codesign_bench.method import Problem, load_method, method_names
+from codesign_bench.seeding import Streams
+from codesign_bench.task import load_task, task_names
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+EXAMPLE = ROOT / "tests" / "third_party"
+
+LINK = re.compile(r"\[[^\]]*\]\(([^)#]+)[^)]*\)")
+BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+GLOSSARY_ROW = re.compile(r"^\| `(\w+)` \|", re.MULTILINE)
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """Return the code blocks of a language on a page."""
+    return [text for name, text in BLOCK.findall(page.read_text(encoding="utf-8")) if name == language]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_to_files(page: Path) -> None:
+    targets = [link for link in LINK.findall(page.read_text(encoding="utf-8")) if "://" not in link]
+    assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+@pytest.mark.parametrize("folder", ["tasks", "methods"])
+def test_every_entry_has_a_page_that_the_index_names(folder: str) -> None:
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    names = sorted(path.stem for path in (ROOT / folder).glob("[a-z]*.py"))
+    assert [name for name in names if not (ROOT / "docs" / folder / f"{name}.md").exists()] == []
+    assert [name for name in names if f"({folder}/{name}.md)" not in index] == []
+
+
+def test_examples_of_contributing_are_parts_of_the_package_that_is_tested() -> None:
+    sources = [path.read_text(encoding="utf-8") for path in EXAMPLE.rglob("*") if path.suffix in (".py", ".cfg")]
+    page = ROOT / "CONTRIBUTING.md"
+    examples = blocks(page, "python") + blocks(page, "ini")
+    assert examples
+    for example in examples:
+        assert any(example.strip("\n") in source for source in sources), example
+
+
+def test_the_readme_uses_names_that_exist() -> None:
+    (example,) = blocks(ROOT / "README.md", "python")
+    used = {
+        node.attr
+        for node in ast.walk(ast.parse(example))
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "cb"
+    }
+    assert used
+    assert [name for name in used if not hasattr(codesign_bench, name)] == []
+
+
+@pytest.mark.parametrize("name", method_names())
+def test_every_logged_value_is_explained_on_the_methods_page(name: str) -> None:
+    method_class, task_name = load_method(name), task_names()[0]
+    config = resolve(method_class, task_name, "quick").method
+    small = {"batch_size": 320, "minibatch_size": 100, "epochs": 1, "episodes_per_candidate": 1, "popsize": 2}
+    config = replace(config, **{key: value for key, value in small.items() if key in {f.name for f in fields(config)}})
+    report = method_class(Problem(load_task(task_name)), config, Streams(0)).train(320)
+    page = ROOT / "docs" / "methods" / f"{name}.md"
+    text = page.read_text(encoding="utf-8")
+    if "two_phase_ppo.md" in text:
+        text += (page.parent / "two_phase_ppo.md").read_text(encoding="utf-8")
+    assert set(report.metrics) <= set(GLOSSARY_ROW.findall(text))

@@ -11,6 +11,8 @@ unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 PYTHON ?= $(shell for name in python3.11 python3.10 python3; do \
 	$$name -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null && { echo $$name; break; }; done)
 PIP_FLAGS ?=
+# Where to look for PyTorch without CUDA, which is several GB smaller; empty: take what the default index gives.
+TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip
 SETUP := setup.cfg pyproject.toml constraints.txt
@@ -54,7 +56,15 @@ clean: ## remove the environment and what tools left behind; results stay
 	$(PYTHON) -m venv .venv
 	touch $@
 
-.venv/installed: .venv/made $(SETUP)
+# The index may be out of reach behind a mirror; then the default index has to do.
+.venv/torch: .venv/made constraints.txt
+	@if [ -n "$(TORCH_INDEX)" ] && $(BIN)/python -c \
+		'import sys, urllib.request as r; r.urlopen(sys.argv[1], timeout=10)' $(TORCH_INDEX)/torch/ 2>/dev/null; then \
+		set -x; $(PIP) install $(PIP_FLAGS) --extra-index-url $(TORCH_INDEX) -c constraints.txt torch; \
+	fi
+	touch $@
+
+.venv/installed: .venv/torch $(SETUP)
 	$(PIP) install $(PIP_FLAGS) -c constraints.txt -e .
 	touch $@
 

@@ -1,0 +1,1 @@
+"""What several methods share: networks, advantages, rollouts of whole episodes, PPO for two phases, CMA-ES."""

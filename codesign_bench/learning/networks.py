@@ -1,0 +1,202 @@
+"""Building blocks: linear layers from a given generator, multilayer perceptrons, index MLP, graph network, normaliser.
+
+Shapes: `B` batch, `F` features, `H` hidden units, `N` nodes of the tool graph, `M` nodes that are needed.
+Sources: Transform2Act (Yuan et al. 2022), on which the paper builds, unless a line says "ours".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from codesign_bench.task import Box, ToolGraph
+
+
+def torch_generator(rng: np.random.Generator) -> torch.Generator:
+    """Return a torch generator seeded by `rng`, for weights alone; everything later draws from numpy generators."""
+    return torch.Generator().manual_seed(int(rng.integers(2**62)))
+
+
+def linear(inputs: int, outputs: int, generator: torch.Generator, bias: bool = True) -> nn.Linear:
+    """Return a linear layer with torch's usual initial weights, U(+-1/sqrt(inputs)), drawn from `generator`."""
+    layer = nn.utils.skip_init(nn.Linear, inputs, outputs, bias=bias)
+    bound = inputs**-0.5
+    with torch.no_grad():
+        for parameter in layer.parameters():
+            parameter.uniform_(-bound, bound, generator=generator)
+    return layer
+
+
+class MLP(nn.Sequential):
+    """Tanh layers and a linear output layer, whose first weights may be scaled down."""
+
+    def __init__(
+        self, sizes: Sequence[int], generator: torch.Generator, output_scale: float = 1.0, activate_last: bool = False
+    ) -> None:
+        layers: list[nn.Module] = []
+        for index, (inputs, outputs) in enumerate(zip(sizes, sizes[1:], strict=False)):
+            layers.append(linear(inputs, outputs, generator))
+            if index < len(sizes) - 2 or activate_last:
+                layers.append(nn.Tanh())
+        super().__init__(*layers)
+        if output_scale != 1.0:
+            with torch.no_grad():
+                layers[-1].weight.mul_(output_scale)  # type: ignore[operator]  # The last layer is linear here.
+                layers[-1].bias.zero_()  # type: ignore[operator]
+
+
+class IndexMLP(nn.Module):
+    """Tanh layers whose weights differ per node; the last layer is linear, scaled by 0.1, with bias 0.
+
+    (M, B, F) node features -> (M, B, outputs).
+    """
+
+    OUTPUT_SCALE = 0.1
+
+    def __init__(self, num_nodes: int, sizes: Sequence[int], generator: torch.Generator) -> None:
+        super().__init__()
+        self.weights = nn.ParameterList()
+        self.biases = nn.ParameterList()
+        for inputs, outputs in zip(sizes, sizes[1:], strict=False):
+            bound = inputs**-0.5
+            self.weights.append(torch.empty(num_nodes, inputs, outputs).uniform_(-bound, bound, generator=generator))
+            self.biases.append(torch.empty(num_nodes, 1, outputs).uniform_(-bound, bound, generator=generator))
+        with torch.no_grad():
+            self.weights[-1].mul_(self.OUTPUT_SCALE)
+            self.biases[-1].zero_()
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Map (M, B, F) to (M, B, outputs)."""
+        last = len(self.weights) - 1
+        for index, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            x = torch.baddbmm(bias, x, weight)
+            if index < last:
+                x = torch.tanh(x)
+        return x
+
+
+class GraphConvolution(nn.Module):
+    """x_i W_own + (sum over neighbours j of x_j) W_neighbours + b, for the nodes that the next layer needs.
+
+    Equal to torch-geometric's `GraphConv` with sum aggregation, on one dense adjacency matrix that all of a batch shares.
+    """
+
+    adjacency: Tensor
+    kept: Tensor
+
+    def __init__(
+        self, inputs: int, outputs: int, adjacency: Tensor, kept: Sequence[int], generator: torch.Generator
+    ) -> None:
+        super().__init__()
+        self.own = linear(inputs, outputs, generator, bias=False)
+        self.neighbours = linear(inputs, outputs, generator)
+        self.register_buffer("adjacency", adjacency, persistent=False)
+        self.register_buffer("kept", torch.tensor(list(kept)), persistent=False)
+        self._keeps_all = list(kept) == list(range(adjacency.shape[1]))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Map (N, B, F) features of this layer's nodes to (M, B, H) features of the nodes that are kept."""
+        nodes, batch, features = x.shape
+        summed = (self.adjacency @ x.reshape(nodes, batch * features)).view(-1, features)
+        own = x if self._keeps_all else x[self.kept]
+        result = torch.addmm(self.neighbours.bias, summed, self.neighbours.weight.t())
+        result = torch.addmm(result, own.reshape(-1, features), self.own.weight.t())
+        return result.view(-1, batch, result.shape[-1])
+
+
+class GraphNetwork(nn.Module):
+    """Linear in, then graph convolutions with ReLU, over one fixed tool graph, read at some of its nodes.
+
+    Every node sees the features that the whole task shares, (B, F), and its own, (N, B, P) or none. A layer computes only
+    the nodes that still reach a node that is read, which changes no number (ours).
+    """
+
+    def __init__(
+        self,
+        shared: int,
+        own: int,
+        hidden: Sequence[int],
+        graph: ToolGraph,
+        read: Sequence[int],
+        generator: torch.Generator,
+    ) -> None:
+        super().__init__()
+        self.num_nodes = graph.num_nodes
+        self.shared = linear(shared, hidden[0], generator)
+        self.own = linear(own, hidden[0], generator, bias=False) if own else None
+        adjacency = adjacency_matrix(graph)
+        needed = [sorted(read)]
+        for _ in hidden:
+            needed.append(sorted({*needed[-1], *(int(j) for i in needed[-1] for j in adjacency[i].nonzero()[:, 0])}))
+        needed.reverse()
+        self.inputs = needed[0]
+        sizes = [hidden[0], *hidden]
+        self.layers = nn.ModuleList()
+        for index in range(len(hidden)):
+            before, after = needed[index], needed[index + 1]
+            block = adjacency[after][:, before]
+            kept = [before.index(node) for node in after]
+            self.layers.append(GraphConvolution(sizes[index], sizes[index + 1], block, kept, generator))
+
+    def forward(self, shared: Tensor, own: Tensor | None = None) -> Tensor:
+        """Map shared (B, F) and own (N, B, P) features to (M, B, H) features of the nodes read, in ascending order."""
+        x = self.shared(shared).expand(len(self.inputs), -1, -1)
+        if self.own is not None and own is not None:
+            x = x + self.own(own[self.inputs] if len(self.inputs) < self.num_nodes else own)
+        for layer in self.layers:
+            x = torch.relu(layer(x))
+        return x
+
+
+def adjacency_matrix(graph: ToolGraph) -> Tensor:
+    """Return the symmetric (N, N) adjacency matrix of a tool graph, without self-loops."""
+    matrix = torch.zeros(graph.num_nodes, graph.num_nodes)
+    for i, j in graph.edges:
+        matrix[i, j] = matrix[j, i] = 1.0
+    return matrix
+
+
+class RunningNorm(nn.Module):
+    """Normalises features by their running mean and standard deviation, clipped to +-5.
+
+    Until the first update it maps the middle and the half width of the features' bounds to 0 and 2 (ours), so that the
+    first rollout, too, sees values of order one.
+    """
+
+    CLIP = 5.0
+    mean: Tensor
+    variance: Tensor
+    count: Tensor
+
+    def __init__(self, low: Sequence[float], high: Sequence[float]) -> None:
+        super().__init__()
+        low_tensor, high_tensor = torch.tensor(low, dtype=torch.float64), torch.tensor(high, dtype=torch.float64)
+        self.register_buffer("mean", 0.5 * (low_tensor + high_tensor))
+        self.register_buffer("variance", (0.25 * (high_tensor - low_tensor)) ** 2)
+        self.register_buffer("count", torch.zeros((), dtype=torch.float64))
+
+    @classmethod
+    def over(cls, *boxes: Box) -> RunningNorm:
+        """Return a normaliser for the entries of `boxes`, one after the other."""
+        return cls([v for box in boxes for v in box.low], [v for box in boxes for v in box.high])
+
+    def update(self, values: Tensor) -> None:
+        """Take (B, F) values into the running mean and variance (Chan et al. 1979)."""
+        values = values.double()
+        count = values.shape[0]
+        total = self.count + count
+        difference = values.mean(0) - self.mean
+        weight = count / total
+        old = torch.where(self.count > 0, self.variance * (self.count / total), torch.zeros_like(self.variance))
+        cross = torch.where(self.count > 0, difference**2 * weight * (1 - weight), torch.zeros_like(self.variance))
+        self.variance.copy_(old + values.var(0, unbiased=False) * weight + cross)
+        self.mean.add_(difference * weight)
+        self.count.copy_(total)
+
+    def forward(self, values: Tensor) -> Tensor:
+        """Normalise (B, F) values."""
+        scale = (self.variance + 1e-8).rsqrt().float()
+        return ((values - self.mean.float()) * scale).clamp(-self.CLIP, self.CLIP)

@@ -1,0 +1,114 @@
+"""Proximal policy optimisation (Schulman et al. 2017): one clipped update of a policy and of a value network.
+
+Shapes: `n` rows of a batch, `O` observation. The update knows nothing of phases: a policy is a function from row
+indices to log-probabilities and entropy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from codesign_bench.task import Slots
+
+LogProbs = Callable[[Slots], tuple[Tensor, Tensor]]
+"""Maps row indices (m,) to the log-probabilities (m,) of their actions and the mean entropy ()."""
+
+
+@dataclass(frozen=True)
+class PolicyLoss:
+    """The clipped surrogate objective with its limits."""
+
+    clip_ratio: float
+    entropy_weight: float
+    kl_threshold: float
+    """The policy's update ends when a minibatch's estimated KL divergence from the old policy exceeds this."""
+    max_gradient_norm: float
+
+    def __call__(self, log_prob: Tensor, old_log_prob: Tensor, advantage: Tensor, entropy: Tensor) -> tuple[Tensor, float]:
+        """Return loss () and the estimated KL divergence (Schulman's k3 estimator) for (m,) inputs."""
+        log_ratio = log_prob - old_log_prob
+        ratio = log_ratio.exp()
+        clipped = ratio.clamp(1.0 - self.clip_ratio, 1.0 + self.clip_ratio)
+        surrogate = torch.minimum(ratio * advantage, clipped * advantage).mean()
+        with torch.no_grad():
+            divergence = float((ratio - 1.0 - log_ratio).mean())
+        return -surrogate - self.entropy_weight * entropy, divergence
+
+
+class PolicyUpdate:
+    """One batch's policy update; stops for good once its KL divergence is too large."""
+
+    def __init__(
+        self, loss: PolicyLoss, log_probs: LogProbs, optimizer: torch.optim.Optimizer, old_log_prob: Tensor, advantage: Tensor
+    ) -> None:
+        self.loss, self.log_probs, self.optimizer = loss, log_probs, optimizer
+        self.old_log_prob, self.advantage = old_log_prob, advantage
+        self.parameters = [p for group in optimizer.param_groups for p in group["params"]]
+        self.stopped = False
+        self.steps = 0
+        self.divergence = 0.0
+
+    def step(self, rows: Slots) -> None:
+        """Take one gradient step on `rows` (m,), unless the update has stopped."""
+        if self.stopped:
+            return
+        index = torch.from_numpy(rows)
+        log_prob, entropy = self.log_probs(rows)
+        loss, self.divergence = self.loss(log_prob, self.old_log_prob[index], self.advantage[index], entropy)
+        if self.divergence > self.loss.kl_threshold:
+            self.stopped = True
+            return
+        gradient_step(loss, self.optimizer, self.parameters, self.loss.max_gradient_norm)
+        self.steps += 1
+
+
+class ValueUpdate:
+    """One batch's regression of a value network on its targets by mean squared error."""
+
+    def __init__(
+        self, network: nn.Module, optimizer: torch.optim.Optimizer, observation: Tensor, target: Tensor, max_norm: float
+    ) -> None:
+        self.network, self.optimizer, self.observation, self.target = network, optimizer, observation, target
+        self.parameters = list(network.parameters())
+        self.max_norm = max_norm
+        self.loss = 0.0
+
+    def step(self, rows: Slots) -> None:
+        """Take one gradient step on `rows` (m,)."""
+        index = torch.from_numpy(rows)
+        loss = nn.functional.mse_loss(self.network(self.observation[index]), self.target[index])
+        gradient_step(loss, self.optimizer, self.parameters, self.max_norm)
+        self.loss = float(loss.detach())
+
+
+def gradient_step(
+    loss: Tensor, optimizer: torch.optim.Optimizer, parameters: list[nn.Parameter], max_norm: float
+) -> None:
+    """Take one step on `loss` with the gradient's norm clipped."""
+    optimizer.zero_grad(set_to_none=True)
+    loss.backward()
+    nn.utils.clip_grad_norm_([p for p in parameters if p.grad is not None], max_norm)
+    optimizer.step()
+
+
+def minibatches(count: int, size: int, rng: np.random.Generator) -> Iterator[Slots]:
+    """Yield a random partition of `count` rows into near-equal parts of about `size` rows."""
+    yield from np.array_split(rng.permutation(count), max(1, round(count / size)))
+
+
+def normalized(values: Tensor) -> Tensor:
+    """Return (n,) values with mean 0 and standard deviation 1; only the mean is removed when all are alike."""
+    spread = values.std(unbiased=False)
+    return (values - values.mean()) / (spread + 1e-8)
+
+
+def gaussian(mean: Tensor, log_std: Tensor, action: Tensor) -> tuple[Tensor, Tensor]:
+    """Return log-probabilities (m,) of actions (m, A) under a diagonal Gaussian, and its entropy ()."""
+    noise = (action - mean) * torch.exp(-log_std)
+    constant = log_std.sum() + 0.5 * float(np.log(2.0 * np.pi)) * log_std.numel()
+    return -0.5 * (noise**2).sum(-1) - constant, constant + 0.5 * log_std.numel()

@@ -1,0 +1,67 @@
+"""A method that is a two-phase PPO learner; its subclasses say which networks it has."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+
+from codesign_bench.learning.actor import Actor, ActorPolicy, load_module_arrays
+from codesign_bench.learning.two_phase import PPOConfig, TwoPhaseLearner
+from codesign_bench.learning.values import ValueNetwork
+from codesign_bench.method import BatchReport, Method, Policy, Problem, State
+from codesign_bench.seeding import Streams
+from codesign_bench.task import Task
+
+ConfigType = TypeVar("ConfigType", bound=PPOConfig)
+
+
+class PPOMethod(Method[ConfigType]):
+    """Everything of a PPO-based method but its networks."""
+
+    config_class: ClassVar[type] = PPOConfig
+
+    def __init__(self, problem: Problem, config: ConfigType, streams: Streams) -> None:
+        super().__init__(problem, config, streams)
+        actor = self.make_actor(problem.task, config, streams["policy weights"])
+        value = self.make_value(problem.task, config, streams["value weights"])
+        self.learner = TwoPhaseLearner(problem, config, streams, actor, value)
+
+    @classmethod
+    @abstractmethod
+    def make_actor(cls, task: Task, config: ConfigType, rng: np.random.Generator) -> Actor:
+        """Return a fresh designer and controller with weights from `rng`."""
+
+    @classmethod
+    @abstractmethod
+    def make_value(cls, task: Task, config: ConfigType, rng: np.random.Generator) -> ValueNetwork:
+        """Return a fresh value network with weights from `rng`."""
+
+    def train(self, remaining_steps: int) -> BatchReport:
+        """Collect one batch of whole episodes and improve all networks on it."""
+        return self.learner.train(remaining_steps)[0]
+
+    def policy(self) -> Policy:
+        """Return the actor acting with its means."""
+        return self.learner.policy()
+
+    @classmethod
+    def make_policy(cls, task: Task, config: ConfigType, tensors: Mapping[str, Any]) -> Policy:
+        """Return the actor with the given parameters, acting with its means."""
+        actor = cls.make_actor(task, config, np.random.default_rng(0))
+        load_module_arrays(actor, tensors)
+        return ActorPolicy(actor)
+
+    def state(self) -> State:
+        """Return the learner's state."""
+        return self.learner.state()
+
+    def load_state(self, state: State) -> None:
+        """Put the learner's state back."""
+        self.learner.load_state(state)
+
+    def warm_start(self, tensors: Mapping[str, Any]) -> None:
+        """Start from a trained actor; the value network starts afresh."""
+        load_module_arrays(self.learner.actor, tensors)

@@ -1,0 +1,330 @@
+"""The two-phase learner: PPO on whole episodes of one design step and many control steps.
+
+Shapes: `S` slots, `T` steps, `n` valid steps of a batch, `d` its design steps, `O` observation.
+
+The design step's credit is a switch. `joint`, the paper's: it is one more step of the episode, with the discounted
+advantage of every other step, in the same minibatches. `separate` (ours, after the temporal credit assignment of
+BodyGen, 2025): its advantage is the undiscounted return minus a value of its own, normalised apart, with its own
+updates and its own KL stop.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from codesign_bench.learning.actor import Actor, ActorPolicy, load_module_arrays, module_arrays
+from codesign_bench.learning.gae import episode_returns, generalized_advantages
+from codesign_bench.learning.ppo import (
+    PolicyLoss,
+    PolicyUpdate,
+    ValueUpdate,
+    gaussian,
+    minibatches,
+    normalized,
+)
+from codesign_bench.learning.rollout import ChooseDesigns, Collector, Trajectories, slots_for
+from codesign_bench.learning.values import DesignValue, ValueNetwork
+from codesign_bench.method import BatchReport, Policy, Problem, State
+from codesign_bench.seeding import Streams
+from codesign_bench.task import Floats, Slots
+
+TRANSFORM2ACT = {"source": "Transform2Act's default; the paper is silent"}
+OURS = {"source": "ours"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PPOConfig:
+    """Hyperparameters that every PPO-based method has. Their defaults are total: any task runs with them."""
+
+    batch_size: int = 20_000
+    """Environment steps of a batch; episodes are finished."""
+    minibatch_size: int = 2_000
+    """Steps of a minibatch."""
+    epochs: int = 5
+    """Passes over a batch (the paper's "PPO steps per batch")."""
+    policy_learning_rate: float = 7e-4
+    """Adam's step size for designer and controller."""
+    value_learning_rate: float = 7e-4
+    """Adam's step size for the value networks."""
+    final_learning_rate_fraction: float = field(default=1.0, metadata=OURS)
+    """Step sizes fall linearly to this fraction of their start over the budget."""
+    entropy_weight: float = 0.0
+    """Weight of the entropy bonus; without effect on fixed standard deviations."""
+    kl_threshold: float = 0.05
+    """A batch's policy update ends at this estimated KL divergence."""
+    control_log_std: float = -0.5
+    """(Initial) log standard deviation of controls in [-1, 1]."""
+    design_log_std: float = -1.0
+    """(Initial) log standard deviation of designs in [-1, 1]."""
+    fix_std: bool = True
+    """Whether the standard deviations stay as they are."""
+    gamma: float = field(default=0.995, metadata=TRANSFORM2ACT)
+    """Discount of a step."""
+    gae_lambda: float = field(default=0.95, metadata=TRANSFORM2ACT)
+    """Weight of longer advantage estimates."""
+    clip_ratio: float = field(default=0.2, metadata=TRANSFORM2ACT)
+    """Clipping range of the probability ratio."""
+    max_gradient_norm: float = field(default=40.0, metadata=TRANSFORM2ACT)
+    """Gradients are clipped to this norm."""
+    bootstrap_time_limit: bool = field(default=True, metadata=OURS)
+    """Whether the time limit is bootstrapped by the value of the state reached; False treats it as an end in itself."""
+    normalize_returns: bool = field(default=True, metadata=OURS)
+    """Whether the value network learns returns normalised by their running mean and deviation."""
+    design_credit: str = "separate"
+    """`joint` (the paper's) or `separate` (ours)."""
+    design_learning_rate: float = 7e-4
+    """Adam's step size for the designer under separate credit."""
+    design_epochs: int = field(default=10, metadata=OURS)
+    """Passes over a batch's design steps under separate credit."""
+    design_minibatch_size: int = field(default=1_000, metadata=OURS)
+    """Design steps of a minibatch under separate credit."""
+    design_kl_threshold: float = field(default=0.05, metadata=OURS)
+    """The design update's own KL stop under separate credit."""
+    num_slots: int | None = field(default=None, metadata=OURS)
+    """Episodes rolled out at once; None: as many as fill a batch with one full-length episode each."""
+
+    def __post_init__(self) -> None:
+        if self.design_credit not in ("joint", "separate"):
+            raise ValueError(f"design_credit is 'joint' or 'separate', not '{self.design_credit}'")
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraphConfig(PPOConfig):
+    """Hyperparameters of a PPO-based method with graph networks."""
+
+    control_gnn: tuple[int, ...] = (64, 64, 64)
+    """Widths of the controller's and the value network's graph convolutions."""
+    control_index_mlp: tuple[int, ...] = (128, 128)
+    """Widths of the controller's index MLP."""
+    design_gnn: tuple[int, ...] = (64, 64, 64)
+    """Widths of the designer's graph convolutions."""
+    design_index_mlp: tuple[int, ...] = (128, 128)
+    """Widths of the designer's index MLP."""
+    value_mlp: tuple[int, ...] = (256, 128)
+    """Widths of the tanh layers behind the value network's graph network."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PerceptronConfig(PPOConfig):
+    """Hyperparameters of a PPO-based method with multilayer perceptrons."""
+
+    policy_net: tuple[int, ...] = (256, 256, 256, 256, 256)
+    """Widths of the policy's hidden layers."""
+    value_net: tuple[int, ...] = (256, 256, 256, 256, 256)
+    """Widths of the value network's hidden layers."""
+
+
+class TwoPhaseLearner:
+    """Collects batches with an actor and improves it by PPO; methods differ in the networks that they hand in."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        config: PPOConfig,
+        streams: Streams,
+        actor: Actor,
+        value: ValueNetwork,
+        choose_designs: ChooseDesigns | None = None,
+    ) -> None:
+        self.problem, self.config, self.streams = problem, config, streams
+        self.actor, self.value, self.choose_designs = actor, value, choose_designs
+        self.separate = config.design_credit == "separate" and choose_designs is None
+        self.design_value = DesignValue(problem.task, streams["design value weights"])
+        control = actor.control_parameters()
+        if not self.separate and choose_designs is None:
+            known = {id(p) for p in control}
+            control = control + [p for p in actor.design_parameters() if id(p) not in known]
+        self.optimizers: dict[str, torch.optim.Adam] = {
+            "policy": _adam(control, config.policy_learning_rate),
+            "value": _adam(list(value.parameters()), config.value_learning_rate),
+        }
+        if self.separate:
+            self.optimizers["design"] = _adam(actor.design_parameters(), config.design_learning_rate)
+            self.optimizers["design_value"] = _adam(list(self.design_value.parameters()), config.value_learning_rate)
+        self._start_rates = {name: optimizer.param_groups[0]["lr"] for name, optimizer in self.optimizers.items()}
+        episode_steps = problem.task.horizon + 1
+        self._episode_steps = episode_steps
+        self.collector = Collector(problem, slots_for(config.batch_size, config.batch_size, episode_steps, config.num_slots))
+        self.env_steps = 0
+
+    def policy(self) -> Policy:
+        """Return the actor acting with its means."""
+        return ActorPolicy(self.actor)
+
+    def train(self, remaining_steps: int) -> tuple[BatchReport, Trajectories]:
+        """Collect one batch and learn from it."""
+        config = self.config
+        steps = min(config.batch_size, remaining_steps)
+        slots = slots_for(steps, config.batch_size, self._episode_steps, config.num_slots)
+        self._anneal(remaining_steps)
+        batch = self.collector.collect(self.actor, steps, slots, self.streams["rollout"], self.choose_designs)
+        self.env_steps += batch.env_steps
+        metrics = batch.summary(self.collector.success_count) | self.update(batch)
+        return BatchReport(batch.env_steps, metrics), batch
+
+    def update(self, batch: Trajectories) -> dict[str, float]:
+        """Improve actor and value networks on a batch; return the logged values."""
+        valid = batch.valid
+        observation = torch.from_numpy(batch.observation[valid])
+        is_design = torch.from_numpy(batch.is_design[valid])
+        advantage, target, explained = self._advantages(batch, observation)
+        metrics = self._update_control(batch, observation, is_design, advantage, target)
+        if self.separate:
+            metrics |= self._update_design(batch)
+        self.actor.update_statistics(observation, is_design)
+        self.value.update_statistics(observation)
+        return metrics | {"explained_variance": explained}
+
+    def _advantages(self, batch: Trajectories, observation: Tensor) -> tuple[Tensor, Tensor, float]:
+        """Return advantage and value target of the valid steps, each (n,), and the share of variance explained."""
+        config, valid = self.config, batch.valid
+        value = np.zeros(valid.shape)
+        with torch.inference_mode():
+            value[valid] = self.value.denormalized(observation).numpy()
+            next_value = np.zeros(valid.shape)
+            next_value[:, :-1] = value[:, 1:]
+            if config.bootstrap_time_limit and batch.truncated.any():
+                final = torch.from_numpy(batch.final_observation[batch.truncated])
+                next_value[batch.truncated] = self.value.denormalized(final).numpy()
+        advantage = generalized_advantages(
+            reward=batch.reward,
+            value=value,
+            next_value=next_value,
+            terminated=batch.terminated if config.bootstrap_time_limit else batch.episode_end,
+            episode_end=batch.episode_end,
+            gamma=config.gamma,
+            gae_lambda=config.gae_lambda,
+        )
+        returns = (advantage + value)[valid]
+        explained = 1.0 - float(np.var(returns - value[valid]) / (np.var(returns) + 1e-12))
+        target = torch.from_numpy(returns.astype(np.float32))
+        if config.normalize_returns:
+            self.value.update_returns(target)
+        return torch.from_numpy(advantage[valid].astype(np.float32)), self.value.normalized(target), explained
+
+    def _update_control(
+        self, batch: Trajectories, observation: Tensor, is_design: Tensor, advantage: Tensor, target: Tensor
+    ) -> dict[str, float]:
+        config, rng = self.config, self.streams["minibatches"]
+        learned = torch.ones_like(is_design) if "joint" == self._credit() else ~is_design
+        rows = torch.nonzero(learned)[:, 0].numpy()
+        normal = torch.zeros_like(advantage)
+        normal[learned] = normalized(advantage[learned])
+        old_log_prob = torch.from_numpy(batch.log_prob[batch.valid])
+        log_probs = self._log_probs(batch, observation, is_design)
+        policy = PolicyUpdate(self._loss(config.kl_threshold), log_probs, self.optimizers["policy"], old_log_prob, normal)
+        value = ValueUpdate(self.value, self.optimizers["value"], observation, target, config.max_gradient_norm)
+        for _ in range(config.epochs):
+            for part in minibatches(len(rows), config.minibatch_size, rng):
+                policy.step(rows[part])
+                value.step(rows[part])
+        return {"value_loss": value.loss, "kl": policy.divergence, "policy_steps": float(policy.steps)} | self._stds()
+
+    def _update_design(self, batch: Trajectories) -> dict[str, float]:
+        config, rng = self.config, self.streams["design minibatches"]
+        where = batch.is_design & batch.valid
+        observation = torch.from_numpy(batch.observation[where])
+        design = torch.from_numpy(batch.design[where])
+        returns = torch.from_numpy(episode_returns(batch.reward, batch.episode_end)[where].astype(np.float32))
+        self.design_value.update_statistics(observation)
+        self.design_value.update_returns(returns)
+        with torch.no_grad():
+            advantage = normalized(returns - self.design_value.denormalized(observation))
+
+        def log_probs(rows: Slots) -> tuple[Tensor, Tensor]:
+            mean, log_std = self.actor.design(observation[rows])
+            return gaussian(mean, log_std, design[rows])
+
+        old_log_prob = torch.from_numpy(batch.log_prob[where])
+        loss = self._loss(config.design_kl_threshold)
+        policy = PolicyUpdate(loss, log_probs, self.optimizers["design"], old_log_prob, advantage)
+        target = self.design_value.normalized(returns)
+        value = ValueUpdate(self.design_value, self.optimizers["design_value"], observation, target, config.max_gradient_norm)
+        for _ in range(config.design_epochs):
+            for rows in minibatches(len(returns), config.design_minibatch_size, rng):
+                policy.step(rows)
+                value.step(rows)
+        return {"design_kl": policy.divergence, "design_steps": float(policy.steps), "design_value_loss": value.loss}
+
+    def _log_probs(self, batch: Trajectories, observation: Tensor, is_design: Tensor) -> Any:
+        """Return the function from rows to log-probabilities and entropy, over both phases under joint credit."""
+        control = torch.from_numpy(batch.control[batch.valid])
+        design = torch.from_numpy(batch.design[batch.valid])
+        joint = self._credit() == "joint"
+
+        def log_probs(rows: Slots) -> tuple[Tensor, Tensor]:
+            index = torch.from_numpy(rows)
+            if not joint:
+                return gaussian(*self.actor.control(observation[index]), control[index])
+            designing = is_design[index]
+            log_prob, entropy = gaussian(*self.actor.control(observation[index[~designing]]), control[index[~designing]])
+            design_log_prob, design_entropy = gaussian(
+                *self.actor.design(observation[index[designing]]), design[index[designing]]
+            )
+            share = float(designing.float().mean())
+            both = torch.zeros(len(rows)).masked_scatter(~designing, log_prob).masked_scatter(designing, design_log_prob)
+            return both, (1.0 - share) * entropy + share * design_entropy
+
+        return log_probs
+
+    def _credit(self) -> str:
+        """Return how the design step is learned here: `joint`, `separate`, or `none` when designs are given."""
+        if self.choose_designs is not None:
+            return "none"
+        return "separate" if self.separate else "joint"
+
+    def _loss(self, kl_threshold: float) -> PolicyLoss:
+        config = self.config
+        return PolicyLoss(config.clip_ratio, config.entropy_weight, kl_threshold, config.max_gradient_norm)
+
+    def _stds(self) -> dict[str, float]:
+        return {
+            "control_std": float(self.actor.control_log_std.detach().exp().mean()),
+            "design_std": float(self.actor.design_log_std.detach().exp().mean()),
+        }
+
+    def _anneal(self, remaining_steps: int) -> None:
+        done = self.env_steps / (self.env_steps + remaining_steps)
+        factor = 1.0 - done * (1.0 - self.config.final_learning_rate_fraction)
+        for name, optimizer in self.optimizers.items():
+            optimizer.param_groups[0]["lr"] = self._start_rates[name] * factor
+
+    def modules(self) -> dict[str, nn.Module]:
+        """Return every module with its name in checkpoints."""
+        return {"actor": self.actor, "value": self.value, "design_value": self.design_value}
+
+    def state(self) -> State:
+        """Return parameters, normalisers, optimizers and the step count."""
+        arrays: dict[str, Any] = {}
+        for name, module in self.modules().items():
+            arrays |= {f"{name}.{key}": array for key, array in module_arrays(module).items()}
+        for name, optimizer in self.optimizers.items():
+            for index, values in optimizer.state_dict()["state"].items():
+                arrays |= {f"optimizer.{name}.{index}.{key}": value.numpy().copy() for key, value in values.items()}
+        return State(arrays, {"env_steps": self.env_steps})
+
+    def load_state(self, state: State) -> None:
+        """Go on from `state`."""
+        for name, module in self.modules().items():
+            load_module_arrays(module, _below(state.arrays, f"{name}."))
+        for name, optimizer in self.optimizers.items():
+            content = optimizer.state_dict()
+            values: dict[int, dict[str, Tensor]] = {}
+            for key, array in _below(state.arrays, f"optimizer.{name}.").items():
+                index, what = key.split(".")
+                values.setdefault(int(index), {})[what] = torch.from_numpy(np.array(array))
+            optimizer.load_state_dict({"state": values, "param_groups": content["param_groups"]})
+        self.env_steps = int(state.values["env_steps"])
+
+
+def _adam(parameters: list[nn.Parameter], learning_rate: float) -> torch.optim.Adam:
+    return torch.optim.Adam([p for p in parameters if p.requires_grad], lr=learning_rate, fused=True)
+
+
+def _below(arrays: dict[str, Any], prefix: str) -> dict[str, Floats]:
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}

@@ -1,0 +1,136 @@
+"""Single-trajectory baseline: CMA-ES over one design and one open-loop control sequence, whatever the goal.
+
+Source: the paper, section "Evaluating sample efficiency" and its table of baseline hyperparameters: "a set of design and
+control actions for an episode independent of the goal or starting task state".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from codesign_bench.learning.evolution import Evolution, EvolutionConfig, paper_evolution
+from codesign_bench.learning.profiles import Tuned, tuned
+from codesign_bench.method import BatchReport, Method, Policy, Problem, State
+from codesign_bench.seeding import Streams
+from codesign_bench.task import Floats, Singles, Task
+
+PLAN = "plan"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Config(EvolutionConfig):
+    """Hyperparameters of `cma_es`."""
+
+    episodes_per_candidate: int = field(default=4, metadata={"source": "ours; the paper is silent"})
+    """Instances on which a candidate's return is averaged; a generation's candidates share them."""
+
+
+TUNED: Tuned = {"laptop": {}, "quick": {}}
+"""What was tuned for this baseline (ours)."""
+
+
+class OpenLoopPolicy(Policy):
+    """One design and one control per time step, whatever is observed but the elapsed time."""
+
+    def __init__(self, task: Task, plan: Floats) -> None:
+        size = task.design_space.size
+        self.task = task
+        self.plan = np.asarray(plan, dtype=np.float64)
+        self.designs: Singles = self.plan[:size].astype(np.float32)
+        self.controls: Singles = self.plan[size:].reshape(task.horizon, task.control_space.size).astype(np.float32)
+
+    def design(self, observation: Singles) -> Singles:
+        """Return the design, the same for every observation."""
+        return np.broadcast_to(self.designs, (*np.shape(observation)[:-1], self.designs.size)).copy()
+
+    def act(self, observation: Singles) -> Singles:
+        """Return the control of the time step that the observation tells."""
+        elapsed = np.asarray(observation)[..., self.task.layout.phase.stop - 1]
+        step = np.minimum(np.rint(elapsed * self.task.horizon).astype(int), self.task.horizon - 1)
+        controls: Singles = self.controls[step]
+        return controls
+
+    def tensors(self) -> dict[str, Any]:
+        """Return the vector that CMA-ES optimises."""
+        return {PLAN: self.plan.copy()}
+
+
+class CmaEs(Method[Config]):
+    """CMA-ES over one design and one open-loop control sequence."""
+
+    name = "cma_es"
+    label = "CMA-ES"
+    config_class = Config
+
+    def __init__(self, problem: Problem, config: Config, streams: Streams) -> None:
+        super().__init__(problem, config, streams)
+        task = problem.task
+        size = task.design_space.size + task.horizon * task.control_space.size
+        self.evolution = Evolution(size, config, streams["plans"])
+        self.episodes = problem.make_episodes(config.popsize * config.episodes_per_candidate)
+
+    @classmethod
+    def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
+        """Return the best of the paper's sweep, or what was tuned for this baseline."""
+        return paper_evolution() if profile == "paper" else tuned(profile, TUNED)
+
+    def train(self, remaining_steps: int) -> BatchReport:
+        """Try one generation: every candidate on the same few instances; its fitness is the mean return.
+
+        A generation is never cut short, so the last one may exceed the budget.
+        """
+        config, problem = self.config, self.problem
+        plans = self.evolution.ask()
+        instances = problem.sample_instances(self.streams["instances"], config.episodes_per_candidate)
+        returns, steps, solved = self._play(plans, instances)
+        fitness = returns.mean(axis=1)
+        self.evolution.tell(fitness)
+        metrics = {
+            "train_return": float(fitness.mean()),
+            "train_best_return": float(fitness.max()),
+            "train_success": solved,
+            "sigma": self.evolution.sigma,
+        }
+        return BatchReport(steps, metrics)
+
+    def _play(self, plans: Floats, instances: Floats) -> tuple[Floats, int, float]:
+        """Return returns (P, instances), simulated steps and success rate of all plans (P, X) on all instances."""
+        task, episodes = self.problem.task, self.episodes
+        count, repeats = len(plans), len(instances)
+        slots = np.arange(count * repeats)
+        owner = np.repeat(np.arange(count), repeats)
+        designs, controls = plans[:, : task.design_space.size], plans[:, task.design_space.size :]
+        controls = controls.reshape(count, task.horizon, task.control_space.size)
+        episodes.begin(slots, np.tile(instances, (count, 1)))
+        episodes.design(slots, designs[owner])
+        returns = np.zeros(len(slots))
+        active, steps = slots, len(slots)
+        for step in range(task.horizon):
+            reward, terminated, truncated = episodes.control(active, controls[owner[active], step])
+            returns[active] += reward
+            steps += len(active)
+            active = active[~(terminated | truncated)]
+            if not active.size:
+                break
+        return returns.reshape(count, repeats), steps, float(episodes.success(slots).mean())
+
+    def policy(self) -> Policy:
+        """Return CMA-ES's mean as a policy."""
+        return OpenLoopPolicy(self.problem.task, self.evolution.mean)
+
+    @classmethod
+    def make_policy(cls, task: Task, config: Config, tensors: Mapping[str, Any]) -> Policy:
+        """Return the policy of an optimised vector."""
+        return OpenLoopPolicy(task, tensors[PLAN])
+
+    def state(self) -> State:
+        """Return CMA-ES's history."""
+        return State({"evolution.history": np.array(self.evolution.history).reshape(-1, self.config.popsize)}, {})
+
+    def load_state(self, state: State) -> None:
+        """Go through CMA-ES's generations again."""
+        self.evolution.replay(state.arrays["evolution.history"])

@@ -1,0 +1,136 @@
+"""Bi-level baseline: CMA-ES over one design outside, PPO for a design-conditioned controller inside.
+
+Source: the paper, section "Evaluating sample efficiency" and its table of baseline hyperparameters. Every PPO batch plays
+whole episodes with the candidates of one generation; a candidate's fitness is its mean return in that batch, and every
+one of those steps counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from codesign_bench.learning.actor import Actor, ActorPolicy, load_module_arrays
+from codesign_bench.learning.evolution import Evolution, EvolutionConfig, paper_evolution
+from codesign_bench.learning.gae import episode_returns
+from codesign_bench.learning.networks import MLP, RunningNorm, torch_generator
+from codesign_bench.learning.observations import Features
+from codesign_bench.learning.profiles import Tuned, paper_perceptrons, ppo_profile, tuned
+from codesign_bench.learning.two_phase import PerceptronConfig, TwoPhaseLearner
+from codesign_bench.learning.values import MLPValue
+from codesign_bench.method import BatchReport, Method, Policy, Problem, State
+from codesign_bench.paper_tables import CMA_RL
+from codesign_bench.seeding import Streams
+from codesign_bench.task import Singles, Slots, Task
+
+
+@dataclass(frozen=True, kw_only=True)
+class Config(EvolutionConfig, PerceptronConfig):
+    """Hyperparameters of `cma_rl`: CMA-ES's for the design, PPO's and the perceptrons' for the controller."""
+
+
+TUNED: Tuned = {"laptop": {}, "quick": {}}
+"""What was tuned for this baseline (ours)."""
+
+
+class GivenDesignActor(Actor):
+    """A design that CMA-ES chooses, kept here for acting, and a perceptron that controls any design."""
+
+    best_design: Tensor
+
+    def __init__(self, task: Task, config: Config, rng: np.random.Generator) -> None:
+        super().__init__()
+        self.features = Features(task)
+        self.norm = RunningNorm.over(*self.features.boxes)
+        self.register_buffer("best_design", torch.zeros(task.design_space.size))
+        sizes = [self.features.flat_size, *config.policy_net, task.control_space.size]
+        self.controller = MLP(sizes, torch_generator(rng), output_scale=0.1)
+        self.add_log_stds(*(task.design_space.size, task.control_space.size), -np.inf, config.control_log_std, config.fix_std)
+
+    def design(self, observation: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the best design (B, D) so far, without spread."""
+        return self.best_design.expand(len(observation), -1), self.design_log_std
+
+    def control(self, observation: Tensor) -> tuple[Tensor, Tensor]:
+        """Return mean (B, C) and log standard deviation (C,) of controls."""
+        return self.controller(self.features.flat(observation, self.norm)), self.control_log_std
+
+    def design_parameters(self) -> list[nn.Parameter]:
+        """Return none: CMA-ES moves the design."""
+        return []
+
+    def control_parameters(self) -> list[nn.Parameter]:
+        """Return the controller's parameters."""
+        return [*self.controller.parameters(), self.control_log_std]
+
+    def update_statistics(self, observation: Tensor, is_design: Tensor) -> None:
+        """Update the controller's normalisation."""
+        self.norm.update(self.features.task(observation[~is_design]))
+
+
+class CmaRl(Method[Config]):
+    """CMA-ES over one design for all goals, with PPO for a design-conditioned controller inside."""
+
+    name = "cma_rl"
+    label = "CMA-RL"
+    config_class = Config
+
+    def __init__(self, problem: Problem, config: Config, streams: Streams) -> None:
+        super().__init__(problem, config, streams)
+        self.evolution = Evolution(problem.task.design_space.size, config, streams["designs"])
+        self.actor = GivenDesignActor(problem.task, config, streams["policy weights"])
+        value = MLPValue(problem.task, config.value_net, streams["value weights"])
+        self.learner = TwoPhaseLearner(problem, config, streams, self.actor, value, self._candidates)
+
+    @classmethod
+    def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
+        """Return PPO's settings with the table's exceptions and CMA-ES's, or what was tuned for this baseline."""
+        exceptions = paper_perceptrons(CMA_RL, task_name) | paper_evolution() if profile == "paper" else {}
+        return ppo_profile(profile, task_name) | exceptions | tuned(profile, TUNED)
+
+    def _candidates(self, slots: Slots, observation: Singles) -> Singles:
+        """Give slot after slot the candidates of this generation in turn."""
+        designs: Singles = self.evolution.ask()[slots % self.config.popsize].astype(np.float32)
+        return designs
+
+    def train(self, remaining_steps: int) -> BatchReport:
+        """Play a batch with one generation of designs, improve the controller on it, and tell CMA-ES the returns.
+
+        A last batch that is too small to try every candidate trains the controller alone.
+        """
+        report, batch = self.learner.train(remaining_steps)
+        returns = np.where(batch.is_design, episode_returns(batch.reward, batch.episode_end), 0.0).sum(axis=1)
+        candidate = np.arange(len(returns)) % self.config.popsize
+        episodes = np.bincount(candidate, batch.is_design.sum(axis=1), minlength=self.config.popsize)
+        if (episodes > 0).all():
+            self.evolution.tell(np.bincount(candidate, returns, minlength=self.config.popsize) / episodes)
+            self.actor.best_design.copy_(torch.from_numpy(self.evolution.mean))
+        return BatchReport(report.env_steps, report.metrics | {"sigma": self.evolution.sigma})
+
+    def policy(self) -> Policy:
+        """Return CMA-ES's mean design with the controller's mean."""
+        return self.learner.policy()
+
+    @classmethod
+    def make_policy(cls, task: Task, config: Config, tensors: Mapping[str, Any]) -> Policy:
+        """Return the design and the controller with the given parameters."""
+        actor = GivenDesignActor(task, config, np.random.default_rng(0))
+        load_module_arrays(actor, tensors)
+        return ActorPolicy(actor)
+
+    def state(self) -> State:
+        """Return the learner's state and CMA-ES's history."""
+        state = self.learner.state()
+        history = np.array(self.evolution.history).reshape(-1, self.config.popsize)
+        return State(state.arrays | {"evolution.history": history}, state.values)
+
+    def load_state(self, state: State) -> None:
+        """Put the learner's state back and go through CMA-ES's generations again."""
+        arrays = dict(state.arrays)
+        self.evolution.replay(arrays.pop("evolution.history"))
+        self.learner.load_state(State(arrays, state.values))

@@ -1,0 +1,250 @@
+"""Push: a held chain of links pushes or pulls a puck until it stops at the goal. Docstring of `Push` has the details.
+
+Shapes: `b` slots a call names, `I` = 2 instance (goal x, y), `D` = 5 design, `C` = 2 control.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pymunk
+
+from codesign_bench.paper_tables import PLANAR_SCENES
+from codesign_bench.task import Booleans, Box, Floats, Simulator, Slots, Task
+
+from ._planar import CHAIN_GRAPH, LINK_HALF_WIDTH, PlanarSimulator, chain_design_space, chain_points, chain_tool
+
+TABLE = PLANAR_SCENES["push"]
+
+TOOL_START = np.array(TABLE.tool_position_init, dtype=np.float64)
+"""Where the held end starts, m (paper, table of push)."""
+START_CLEARANCE = 0.25
+"""A tool that would reach closer to the puck than this starts further right by what is missing, m (ours)."""
+FIRST_LINK_ANGLE = np.pi
+"""The first link points left, from the robot's side towards the puck, rad (ours)."""
+WORKSPACE = Box.of(base_x=(17.5, 27.0, "m"), base_y=(0.0, 20.0, "m"))
+"""Where the held end may go: on the robot's side of the puck, so that far goals need reach and near ones a hook (ours)."""
+MAX_SPEED = 6.0
+"""Largest speed of the held end along each axis, m/s (ours): 0.1 m a physics step, a tenth of the puck's radius."""
+
+PUCK_START = np.array([15.0, 10.0])
+"""m (ours)."""
+PUCK_RADIUS = 1.0
+"""m (scale of the first author's early scenes)."""
+PUCK_DENSITY = 1.0
+"""kg/m^2 (scale of the early scenes)."""
+PUCK_DECELERATION = 12.0
+"""Friction of the table stops a sliding puck at this rate, m/s^2 (ours): at full tool speed within 1.5 m."""
+CONTACT_FRICTION = 0.3
+"""Between link and puck (scale of the early scenes)."""
+
+GOAL_DISTANCE = (3.0, 7.0)
+"""Smallest and largest distance of a goal from the puck's start, m (ours)."""
+GOAL_RADIUS = 1.0
+"""The puck's centre must stop within this distance of the goal, m (ours)."""
+REST_SPEED = 0.2
+"""A puck slower than this is at rest, m/s (ours)."""
+REST_STEPS = 3
+"""Control steps in a row for which the puck must rest at the goal (ours)."""
+SUCCESS_REWARD = 1.0
+"""Added once, when the puck rests at the goal (ours; the paper lists one for its 3D tasks only)."""
+
+PHYSICS_STEPS = 2
+"""Physics steps per control step (ours)."""
+PHYSICS_PERIOD = 1.0 / 60.0
+"""s (the early scenes' time step)."""
+
+
+class Push(Task):
+    """Push a round puck with the tool such that it stops at the goal (paper, appendix "Environment Details").
+
+    Seen from above. The tool is a chain of three links whose free end the robot holds and moves; it never turns, so
+    what the tool can do to the puck is decided by its shape. Goals lie all around the puck; the held end stays on the
+    right of the puck's start, so goals on the right must be reached by pulling, and goals on the left by reaching over.
+
+    Action space
+        Design, 5: lengths of three links, 1 to 3 m each, and the two angles between them, +-90 degrees (paper, table
+        of push). Control, 2: velocity of the held end, +-6 m/s along x and y (range ours).
+
+    Observation
+        | index | what | unit | range |
+        | --- | --- | --- | --- |
+        | 0, 1 | puck position x, y | m | -6 .. 30 |
+        | 2, 3 | puck velocity x, y | m/s | -20 .. 20 |
+        | 4, 5 | held end's position x, y | m | workspace |
+        | 6, 7 | goal position x, y | m | 5 .. 19 |
+
+        followed by the design (5, normalised) and the phase (3).
+
+    Design space
+        `Push.design_space`; length = 2 m (1 + r), r in [-0.5, 0.5]; angle = 90 degrees r, r in [-1, 1].
+
+    Goal space
+        Positions 3 to 7 m from the puck's start, uniform in area, all directions (ours).
+
+    Reward
+        (d_before - d_after) / d_start - 0.001 per control step, d the distance from puck to goal in m; +1 on success.
+        An episode's return lies below 2.
+
+    Starting state
+        Puck at rest at (15, 10), held end at (20, 10) (paper) for every goal. A tool that would then lie on the puck
+        starts further right, 0.25 m clear of it (ours).
+
+    Episode end
+        Success: the puck's centre is within 1 m of the goal and slower than 0.2 m/s for 3 control steps. Time limit:
+        150 control steps of 1/30 s (150 is the paper's).
+    """
+
+    name = "push"
+    title = "Push"
+    horizon = TABLE.max_episode_steps
+    control_period = PHYSICS_STEPS * PHYSICS_PERIOD
+    design_space = chain_design_space(
+        TABLE.tool_length_init, TABLE.tool_length_ratio, TABLE.tool_angle_scale, TABLE.tool_angle_ratio
+    )
+    tool_graph = CHAIN_GRAPH
+    control_space = Box.of(velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"), velocity_y=(-MAX_SPEED, MAX_SPEED, "m/s"))
+    instance_space = Box.of(
+        goal_x=(PUCK_START[0] - GOAL_DISTANCE[1], PUCK_START[0] + GOAL_DISTANCE[1], "m"),
+        goal_y=(PUCK_START[1] - GOAL_DISTANCE[1], PUCK_START[1] + GOAL_DISTANCE[1], "m"),
+    )
+    goal_size = 2
+    state_space = Box.of(
+        puck_x=(-6.0, 30.0, "m"),
+        puck_y=(-6.0, 30.0, "m"),
+        puck_velocity_x=(-20.0, 20.0, "m/s"),
+        puck_velocity_y=(-20.0, 20.0, "m/s"),
+        base_x=(WORKSPACE.low[0], WORKSPACE.high[0], "m"),
+        base_y=(WORKSPACE.low[1], WORKSPACE.high[1], "m"),
+    )
+
+    def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
+        """Return (count, I) goals, uniform in the area of the ring around the puck."""
+        near, far = GOAL_DISTANCE
+        distance = np.sqrt(rng.uniform(near**2, far**2, size=count))
+        angle = rng.uniform(-np.pi, np.pi, size=count)
+        return PUCK_START + distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+    def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
+        """Tell which goals (b, I) lie in the two patches, above and below the puck, that cover `fraction` of the ring.
+
+        A patch is a sector of the ring, centred in angle and in area, scaled alike in both (ours, after the paper's
+        two patches of fetch cube).
+        """
+        near, far = GOAL_DISTANCE
+        offset = instances[:, :2] - PUCK_START
+        area = ((offset**2).sum(axis=1) - near**2) / (far**2 - near**2)
+        turn = np.abs(np.arctan2(offset[:, 1], offset[:, 0])) / np.pi
+        reach = 0.5 * np.sqrt(fraction)
+        result: Booleans = (np.abs(area - 0.5) < reach) & (np.abs(turn - 0.5) < reach)
+        return result
+
+    def material(self, designs: Floats) -> Floats:
+        """Return the used share of the largest total link length for designs (b, D) in their units."""
+        total: Floats = designs[:, :3].sum(axis=1) / sum(self.design_space.high[:3])
+        return total
+
+    def effort(self, controls: Floats) -> Floats:
+        """Return the share of the largest speed of the held end for controls (b, C) in [-1, 1]."""
+        speed: Floats = np.linalg.norm(controls, axis=1) / np.sqrt(controls.shape[1])
+        return speed
+
+    def make_simulator(self, num_slots: int) -> Simulator:
+        """Return a simulator of `num_slots` pucks and tools."""
+        return _PushSimulator(num_slots, self.state_space.size)
+
+
+class _PushSimulator(PlanarSimulator):
+    """Puck on a table with dry friction and a kinematic tool, one pair per slot."""
+
+    def __init__(self, num_slots: int, state_size: int) -> None:
+        super().__init__(num_slots, state_size, num_bodies=2)
+        self.goal = np.zeros((num_slots, 2))
+        self.start_distance = np.ones(num_slots)
+        self.distance = np.zeros(num_slots)
+        self.rest_steps = np.zeros(num_slots, dtype=np.intp)
+        self.tools: list[pymunk.Body | None] = [None] * num_slots
+
+    def begin(self, slots: Slots, instances: Floats) -> None:
+        """Put pucks and held ends at their start and the goals where `instances` (b, I) say."""
+        self.goal[slots] = instances
+        self.start_distance[slots] = np.linalg.norm(PUCK_START - instances, axis=1)
+        self.distance[slots] = self.start_distance[slots]
+        self.rest_steps[slots] = 0
+        self.reward[slots] = 0.0
+        self.success[slots] = False
+        self.bodies[slots, 0] = (*PUCK_START, 0.0, 0.0)
+        self.bodies[slots, 1] = (*TOOL_START, 0.0, 0.0)
+        self._write_state(slots)
+
+    def build(self, slots: Slots, designs: Floats) -> None:
+        """Build the scenes with tools of `designs` (b, D)."""
+        points = chain_points(designs, FIRST_LINK_ANGLE)
+        self.bodies[slots, 1, 0] = TOOL_START[0] + start_shift(points)
+        self._write_state(slots)
+        self.add_spaces(slots, points)
+
+    def build_space(self, slot: int, points: Floats) -> pymunk.Space:
+        """Return the scene of one episode: puck, table friction, tool."""
+        space = pymunk.Space()
+        mass = PUCK_DENSITY * np.pi * PUCK_RADIUS**2
+        puck = pymunk.Body(mass, float("inf"))  # A round puck's spin changes nothing that matters here.
+        puck.position = tuple(PUCK_START.tolist())
+        disc = pymunk.Circle(puck, PUCK_RADIUS)
+        disc.friction = 1.0  # pymunk multiplies the two frictions of a contact.
+        table = pymunk.PivotJoint(space.static_body, puck, (0.0, 0.0), (0.0, 0.0))
+        table.max_bias = 0.0
+        table.max_force = mass * PUCK_DECELERATION
+        tool, links = chain_tool(points, CONTACT_FRICTION)
+        tool.position = tuple(self.bodies[slot, 1, :2].tolist())
+        space.add(puck, disc, table)
+        space.add(tool, *links)
+        self.tools[slot] = tool
+        return space
+
+    def step(self, slots: Slots, controls: Floats) -> None:
+        """Move the held ends by `controls` (b, C) for one control step and reward the pucks' progress."""
+        period = PHYSICS_STEPS * PHYSICS_PERIOD
+        base = self.bodies[slots, 1, :2]
+        velocity = (np.clip(base + controls * (MAX_SPEED * period), *WORKSPACE.bounds) - base) / period
+        for slot, pair in zip(slots.tolist(), velocity.tolist(), strict=True):
+            tool = self.tools[slot]
+            assert tool is not None, "a tool is built before it is moved"
+            tool.velocity = tuple(pair)
+        self.advance(slots, PHYSICS_PERIOD, PHYSICS_STEPS)
+        puck = self.read_bodies(slots)[:, 0]
+        distance = np.linalg.norm(puck[:, :2] - self.goal[slots], axis=1)
+        resting = (distance < GOAL_RADIUS) & (np.linalg.norm(puck[:, 2:], axis=1) < REST_SPEED)
+        self.rest_steps[slots] = np.where(resting, self.rest_steps[slots] + 1, 0)
+        self.success[slots] = self.rest_steps[slots] >= REST_STEPS
+        progress = (self.distance[slots] - distance) / self.start_distance[slots]
+        self.reward[slots] = progress + TABLE.slack_reward + SUCCESS_REWARD * self.success[slots]
+        self.distance[slots] = distance
+        self._write_state(slots)
+
+    def _write_state(self, slots: Slots) -> None:
+        bodies = self.bodies[slots]
+        self.state[slots, :4] = bodies[:, 0]
+        self.state[slots, 4:] = bodies[:, 1, :2]
+
+
+def start_shift(points: Floats) -> Floats:
+    """Return by how much (b,) tools with chain `points` (b, 4, 2) must start further right to be clear of the puck, m.
+
+    A link's core must stay outside the disc around the puck of radius `reach`. Moving right, it leaves the disc at the
+    last of: either of its ends leaving, and its line leaving where the line touches the disc.
+    """
+    reach = PUCK_RADIUS + LINK_HALF_WIDTH + START_CLEARANCE
+    start, end = points[:, :-1] + TOOL_START - PUCK_START, points[:, 1:] + TOOL_START - PUCK_START
+    leaves = [np.sqrt(np.maximum(reach**2 - at[..., 1] ** 2, 0.0)) - at[..., 0] for at in (start, end)]
+    leaves = [np.where(np.abs(at[..., 1]) < reach, leave, 0.0) for at, leave in zip((start, end), leaves, strict=True)]
+    direction = (end - start) / np.linalg.norm(end - start, axis=-1, keepdims=True)
+    # The line's normal that points right: the link touches the disc last at -reach times it.
+    normal = np.stack([direction[..., 1], -direction[..., 0]], axis=-1)
+    normal *= np.where(normal[..., :1] < 0.0, -1.0, 1.0)
+    touching = reach * normal
+    slope = np.where(np.abs(normal[..., 0]) > 1e-9, normal[..., 0], 1.0)
+    shift = ((touching - start) * normal).sum(-1) / slope
+    along = ((touching - start - shift[..., None] * np.array([1.0, 0.0])) * direction).sum(-1)
+    inside = (along > 0.0) & (along < np.linalg.norm(end - start, axis=-1)) & (np.abs(normal[..., 0]) > 1e-9)
+    result: Floats = np.maximum(0.0, np.max([*leaves, np.where(inside, shift, 0.0)], axis=(0, 2)))
+    return result

@@ -52,7 +52,7 @@ class Problem:
 
 
 class Policy(ABC):
-    """A designer and a controller that act with their means; what evaluation, rendering, export and deployment share."""
+    """A designer and a controller that act with their means, as evaluation and everything after it uses them."""
 
     @abstractmethod
     def design(self, observation: Singles) -> Singles:
@@ -106,7 +106,7 @@ class Method(ABC, Generic[ConfigType]):
     @classmethod
     @abstractmethod
     def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
-        """Return what `profile` sets for the task: key -> (value, source). Unknown tasks get the profile's general values."""
+        """Return what `profile` sets for the task: key -> (value, source); unknown tasks get its general values."""
 
     @abstractmethod
     def train(self, remaining_steps: int) -> BatchReport:

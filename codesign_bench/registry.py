@@ -24,7 +24,7 @@ _registered: dict[str, dict[str, Callable[[], Any]]] = {}
 
 
 def register(group: str, name: str, loader: Callable[[], Any]) -> None:
-    """Add the entry `name` to `group` ("methods" or "tasks"); `loader` returns its class. For modules named by `--import`."""
+    """Add the entry `name` to `group` ("methods" or "tasks"); `loader` returns its class. For `--import`."""
     _registered.setdefault(group, {})[name] = loader
 
 

@@ -1,6 +1,7 @@
 """What a task is: spaces, instances, a batched simulator. It knows nothing of methods.
 
-Shapes: `B` slots of a simulator, `b` the slots a call names, `I` instance, `G` goal, `S` state, `D` design, `C` control.
+Shapes: `B` slots of a simulator, `b` the slots a call names, `I` instance, `G` goal, `S` state, `D` design,
+`C` control.
 A new task is one file in `tasks/` with one public subclass of `Task`.
 """
 
@@ -100,7 +101,9 @@ class Layout:
     def of(cls, state: int, goal: int, design: int) -> Layout:
         """Lay out an observation of the given part sizes."""
         ends = np.cumsum([state, goal, design, len(cls.PHASE_NAMES)])
-        return cls(*(slice(int(end - size), int(end)) for end, size in zip(ends, (state, goal, design, 3), strict=True)))
+        return cls(
+            *(slice(int(end - size), int(end)) for end, size in zip(ends, (state, goal, design, 3), strict=True))
+        )
 
     @property
     def size(self) -> int:
@@ -136,7 +139,7 @@ class Simulator(ABC):
 
     @abstractmethod
     def step(self, slots: Slots, controls: Floats) -> None:
-        """Advance `slots` by one control step with `controls` (b, C) in [-1, 1]; write state, reward, success, failure."""
+        """Advance `slots` by one control step with `controls` (b, C) in [-1, 1]; write state, reward and both ends."""
 
 
 class Task(ABC):

@@ -1,7 +1,7 @@
 """Single-trajectory baseline: CMA-ES over one design and one open-loop control sequence, whatever the goal.
 
-Source: the paper, section "Evaluating sample efficiency" and its table of baseline hyperparameters: "a set of design and
-control actions for an episode independent of the goal or starting task state".
+Source: the paper, section "Evaluating sample efficiency" and its table of baseline hyperparameters: "a set of design
+and control actions for an episode independent of the goal or starting task state".
 """
 
 from __future__ import annotations

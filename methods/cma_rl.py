@@ -1,8 +1,8 @@
 """Bi-level baseline: CMA-ES over one design outside, PPO for a design-conditioned controller inside.
 
-Source: the paper, section "Evaluating sample efficiency" and its table of baseline hyperparameters. Every PPO batch plays
-whole episodes with the candidates of one generation; a candidate's fitness is its mean return in that batch, and every
-one of those steps counts.
+Source: the paper, section "Evaluating sample efficiency" and its table of baseline hyperparameters. Every PPO batch
+plays whole episodes with the candidates of one generation; a candidate's fitness is its mean return in that batch, and
+every one of those steps counts.
 """
 
 from __future__ import annotations
@@ -50,7 +50,9 @@ class GivenDesignActor(Actor):
         self.register_buffer("best_design", torch.zeros(task.design_space.size))
         sizes = [self.features.flat_size, *config.policy_net, task.control_space.size]
         self.controller = MLP(sizes, torch_generator(rng), output_scale=0.1)
-        self.add_log_stds(*(task.design_space.size, task.control_space.size), -np.inf, config.control_log_std, config.fix_std)
+        self.add_log_stds(
+            *(task.design_space.size, task.control_space.size), -np.inf, config.control_log_std, config.fix_std
+        )
 
     def design(self, observation: Tensor) -> tuple[Tensor, Tensor]:
         """Return the best design (B, D) so far, without spread."""

@@ -1,4 +1,4 @@
-"""One file, one task: its physics, its reward, its goal space. Files that begin with an underscore hold what several share."""
+"""One file, one task: its physics, its reward, its goal space. Files with an underscore hold what several share."""
 
 ORDER = ("push",)
 """The order in listings and figures."""

@@ -7,6 +7,7 @@ Lengths are in m, angles in rad, times in s. The chain is the paper's (section "
 from __future__ import annotations
 
 from abc import abstractmethod
+from itertools import pairwise
 
 import numpy as np
 import pymunk
@@ -27,13 +28,13 @@ def chain_design_space(
     angle_scale: float,
     angle_ratio: tuple[float, float],
 ) -> Box:
-    """Return the design space of a chain: length = init (1 + ratio), angle = scale ratio; `angle_scale` is in degrees."""
+    """Return a chain's design space: length = init (1 + ratio), angle = scale ratio; `angle_scale` in degrees."""
     lengths = {
         f"link_{index + 1}_length": (length * (1.0 + length_ratio[0]), length * (1.0 + length_ratio[1]), "m")
         for index, length in enumerate(length_init)
     }
-    angles = tuple(float(np.deg2rad(angle_scale * ratio)) for ratio in angle_ratio)
-    return Box.of(**lengths, joint_1_angle=(*angles, "rad"), joint_2_angle=(*angles, "rad"))
+    low, high = (float(np.deg2rad(angle_scale * ratio)) for ratio in angle_ratio)
+    return Box.of(**lengths, joint_1_angle=(low, high, "rad"), joint_2_angle=(low, high, "rad"))
 
 
 def chain_points(designs: Floats, first_link_angle: float) -> Floats:
@@ -94,7 +95,7 @@ def chain_tool(points: Floats, friction: float) -> tuple[pymunk.Body, list[pymun
     """Return a kinematic body with one rounded segment per link of the chain `points` (4, 2); links never collide."""
     body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
     corners = [tuple(point) for point in points.tolist()]
-    links = [pymunk.Segment(body, *ends, LINK_HALF_WIDTH) for ends in zip(corners, corners[1:], strict=False)]
+    links = [pymunk.Segment(body, *ends, LINK_HALF_WIDTH) for ends in pairwise(corners)]
     for link in links:
         link.friction = friction
     return body, links

@@ -22,7 +22,7 @@ START_CLEARANCE = 0.25
 FIRST_LINK_ANGLE = np.pi
 """The first link points left, from the robot's side towards the puck, rad (ours)."""
 WORKSPACE = Box.of(base_x=(17.5, 27.0, "m"), base_y=(0.0, 20.0, "m"))
-"""Where the held end may go: on the robot's side of the puck, so that far goals need reach and near ones a hook (ours)."""
+"""Where the held end may go: the robot's side of the puck, so that goals need reach or a hook (ours)."""
 MAX_SPEED = 6.0
 """Largest speed of the held end along each axis, m/s (ours): 0.1 m a physics step, a tenth of the puck's radius."""
 
@@ -71,7 +71,9 @@ class Push(Task):
         | 0, 1 | puck position x, y | m | -6 .. 30 |
         | 2, 3 | puck velocity x, y | m/s | -20 .. 20 |
         | 4, 5 | held end's position x, y | m | workspace |
-        | 6, 7 | goal position x, y | m | 5 .. 19 |
+        | 6, 7 | from puck to goal x, y | m | -25 .. 25 |
+        | 8, 9 | from held end to puck x, y | m | -25 .. 25 |
+        | 10, 11 | goal position x, y | m | 8 .. 22 and 3 .. 17 |
 
         followed by the design (5, normalised) and the phase (3).
 
@@ -115,6 +117,10 @@ class Push(Task):
         puck_velocity_y=(-20.0, 20.0, "m/s"),
         base_x=(WORKSPACE.low[0], WORKSPACE.high[0], "m"),
         base_y=(WORKSPACE.low[1], WORKSPACE.high[1], "m"),
+        puck_to_goal_x=(-25.0, 25.0, "m"),
+        puck_to_goal_y=(-25.0, 25.0, "m"),
+        base_to_puck_x=(-25.0, 25.0, "m"),
+        base_to_puck_y=(-25.0, 25.0, "m"),
     )
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
@@ -224,7 +230,9 @@ class _PushSimulator(PlanarSimulator):
     def _write_state(self, slots: Slots) -> None:
         bodies = self.bodies[slots]
         self.state[slots, :4] = bodies[:, 0]
-        self.state[slots, 4:] = bodies[:, 1, :2]
+        self.state[slots, 4:6] = bodies[:, 1, :2]
+        self.state[slots, 6:8] = self.goal[slots] - bodies[:, 0, :2]
+        self.state[slots, 8:] = bodies[:, 0, :2] - bodies[:, 1, :2]
 
 
 def start_shift(points: Floats) -> Floats:

@@ -50,7 +50,7 @@ class GraphDesigner(nn.Module):
 
 
 class GraphController(nn.Module):
-    """Graph network over the designed tool, read at the held link by its index MLP: the robot moves that link (ours)."""
+    """Graph network over the designed tool, read at the held link, which the robot moves, by its index MLP (ours)."""
 
     def __init__(
         self, task: Task, graph_sizes: tuple[int, ...], index_sizes: tuple[int, ...], rng: np.random.Generator

@@ -29,7 +29,9 @@ class PolicyLoss:
     """The policy's update ends when a minibatch's estimated KL divergence from the old policy exceeds this."""
     max_gradient_norm: float
 
-    def __call__(self, log_prob: Tensor, old_log_prob: Tensor, advantage: Tensor, entropy: Tensor) -> tuple[Tensor, float]:
+    def __call__(
+        self, log_prob: Tensor, old_log_prob: Tensor, advantage: Tensor, entropy: Tensor
+    ) -> tuple[Tensor, float]:
         """Return loss () and the estimated KL divergence (Schulman's k3 estimator) for (m,) inputs."""
         log_ratio = log_prob - old_log_prob
         ratio = log_ratio.exp()
@@ -44,7 +46,12 @@ class PolicyUpdate:
     """One batch's policy update; stops for good once its KL divergence is too large."""
 
     def __init__(
-        self, loss: PolicyLoss, log_probs: LogProbs, optimizer: torch.optim.Optimizer, old_log_prob: Tensor, advantage: Tensor
+        self,
+        loss: PolicyLoss,
+        log_probs: LogProbs,
+        optimizer: torch.optim.Optimizer,
+        old_log_prob: Tensor,
+        advantage: Tensor,
     ) -> None:
         self.loss, self.log_probs, self.optimizer = loss, log_probs, optimizer
         self.old_log_prob, self.advantage = old_log_prob, advantage

@@ -147,9 +147,7 @@ class Collector:
         self.episodes.design(slots, designs.astype(np.float64))
         time[slots] += 1
 
-    def _control(
-        self, actor: Actor, data: Trajectories, slots: Slots, time: Slots, control_noise: Singles
-    ) -> Booleans:
+    def _control(self, actor: Actor, data: Trajectories, slots: Slots, time: Slots, control_noise: Singles) -> Booleans:
         observation = self.episodes.observation[slots]
         now = time[slots]
         mean, log_std = actor.control(torch.from_numpy(observation))

@@ -149,7 +149,9 @@ class TwoPhaseLearner:
         self._start_rates = {name: optimizer.param_groups[0]["lr"] for name, optimizer in self.optimizers.items()}
         episode_steps = problem.task.horizon + 1
         self._episode_steps = episode_steps
-        self.collector = Collector(problem, slots_for(config.batch_size, config.batch_size, episode_steps, config.num_slots))
+        self.collector = Collector(
+            problem, slots_for(config.batch_size, config.batch_size, episode_steps, config.num_slots)
+        )
         self.env_steps = 0
 
     def policy(self) -> Policy:
@@ -211,13 +213,15 @@ class TwoPhaseLearner:
         self, batch: Trajectories, observation: Tensor, is_design: Tensor, advantage: Tensor, target: Tensor
     ) -> dict[str, float]:
         config, rng = self.config, self.streams["minibatches"]
-        learned = torch.ones_like(is_design) if "joint" == self._credit() else ~is_design
+        learned = torch.ones_like(is_design) if self._credit() == "joint" else ~is_design
         rows = torch.nonzero(learned)[:, 0].numpy()
         normal = torch.zeros_like(advantage)
         normal[learned] = normalized(advantage[learned])
         old_log_prob = torch.from_numpy(batch.log_prob[batch.valid])
         log_probs = self._log_probs(batch, observation, is_design)
-        policy = PolicyUpdate(self._loss(config.kl_threshold), log_probs, self.optimizers["policy"], old_log_prob, normal)
+        policy = PolicyUpdate(
+            self._loss(config.kl_threshold), log_probs, self.optimizers["policy"], old_log_prob, normal
+        )
         value = ValueUpdate(self.value, self.optimizers["value"], observation, target, config.max_gradient_norm)
         for _ in range(config.epochs):
             for part in minibatches(len(rows), config.minibatch_size, rng):
@@ -244,7 +248,9 @@ class TwoPhaseLearner:
         loss = self._loss(config.design_kl_threshold)
         policy = PolicyUpdate(loss, log_probs, self.optimizers["design"], old_log_prob, advantage)
         target = self.design_value.normalized(returns)
-        value = ValueUpdate(self.design_value, self.optimizers["design_value"], observation, target, config.max_gradient_norm)
+        value = ValueUpdate(
+            self.design_value, self.optimizers["design_value"], observation, target, config.max_gradient_norm
+        )
         for _ in range(config.design_epochs):
             for rows in minibatches(len(returns), config.design_minibatch_size, rng):
                 policy.step(rows)
@@ -262,12 +268,16 @@ class TwoPhaseLearner:
             if not joint:
                 return gaussian(*self.actor.control(observation[index]), control[index])
             designing = is_design[index]
-            log_prob, entropy = gaussian(*self.actor.control(observation[index[~designing]]), control[index[~designing]])
+            log_prob, entropy = gaussian(
+                *self.actor.control(observation[index[~designing]]), control[index[~designing]]
+            )
             design_log_prob, design_entropy = gaussian(
                 *self.actor.design(observation[index[designing]]), design[index[designing]]
             )
             share = float(designing.float().mean())
-            both = torch.zeros(len(rows)).masked_scatter(~designing, log_prob).masked_scatter(designing, design_log_prob)
+            both = (
+                torch.zeros(len(rows)).masked_scatter(~designing, log_prob).masked_scatter(designing, design_log_prob)
+            )
             return both, (1.0 - share) * entropy + share * design_entropy
 
         return log_probs

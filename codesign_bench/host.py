@@ -9,8 +9,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-import joblib
-
 PACKAGES = ("codesign_bench", "numpy", "torch", "pymunk", "pybullet", "cma", "gymnasium")
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -24,6 +22,8 @@ THREAD_VARIABLES = (
 
 def available_cores() -> int:
     """Return how many cores this process may use: its affinity and its container's quota count."""
+    import joblib  # not at the top: the process of a cell has no other use for it
+
     return int(joblib.cpu_count())
 
 
@@ -49,7 +49,7 @@ def host_facts(threads: int) -> dict[str, Any]:
         "name": socket.gethostname(),
         "system": platform.platform(),
         "cpu": _processor(),
-        "cores": available_cores(),
+        "cores": os.cpu_count(),
         "threads": threads,
     }
 

@@ -105,7 +105,7 @@ def progress_table(snapshot: Snapshot) -> Table:
     """Return the live table: one row per running cell, and the total as its caption."""
     table = Table(caption=snapshot.line(), caption_justify="left")
     for heading in ("cell", "phase", "steps", "done", "steps/s", "return", "success"):
-        table.add_column(heading, justify="left" if heading in ("cell", "phase") else "right")
+        table.add_column(heading, justify="left" if heading in ("cell", "phase") else "right", overflow="fold")
     for cell, found in snapshot.running:
         share = min(found["env_steps"] / found["steps"], 1.0)
         table.add_row(

@@ -11,16 +11,20 @@ OUT/<task>/<method>/<variant>/seed-00/cell.json          status, configuration w
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import filelock
-import pandas as pd
 
 from codesign_bench.errors import UserError
 from codesign_bench.files import write_bytes, write_json
+
+if TYPE_CHECKING:  # pandas takes a second to import, which every cell's process would pay
+    import pandas as pd
 
 MARKER_FILE = "codesign-bench.json"
 CELL_FILE = "cell.json"
@@ -71,9 +75,12 @@ def write_cell(folder: Path, content: Mapping[str, Any]) -> None:
 
 def write_rows(path: Path, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> None:
     """Replace the CSV file `path` by `rows`; `columns` come first and are there even without rows."""
-    found = dict.fromkeys((*columns, *(name for row in rows for name in row)))
-    frame = pd.DataFrame(list(rows), columns=list(found))
-    write_bytes(path, frame.to_csv(index=False, lineterminator="\n").encode())
+    names = list(dict.fromkeys((*columns, *(name for row in rows for name in row))))
+    table = io.StringIO()
+    writer = csv.DictWriter(table, names, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_bytes(path, table.getvalue().encode())
 
 
 def cell_lock(folder: Path) -> filelock.BaseFileLock:
@@ -143,6 +150,8 @@ def load_results(out: str | Path) -> pd.DataFrame:
     Raises:
         UserError: there is no such folder, or no result in it.
     """
+    import pandas as pd
+
     frames = [frame for folder, content in find_cells(Path(out)) if (frame := _read_curve(folder, content)) is not None]
     if not frames:
         raise UserError(f"no results in '{out}' yet; make some with: codesign-bench run --out {out}")
@@ -151,6 +160,8 @@ def load_results(out: str | Path) -> pd.DataFrame:
 
 
 def _read_curve(folder: Path, content: Mapping[str, Any]) -> pd.DataFrame | None:
+    import pandas as pd
+
     try:
         curve = pd.read_csv(folder / CURVE_FILE)
     except (OSError, ValueError):  # not evaluated yet, or no table

@@ -1,0 +1,244 @@
+"""What every task promises, checked for every task alike: same seed same rollout, bounds, ends, instances, cutout.
+
+Shapes: `b` episodes played side by side, `T` control steps, `O` observation, `D` design, `C` control, `I` instance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from codesign_bench.episodes import Episodes, Tradeoff
+from codesign_bench.errors import UserError
+from codesign_bench.method import Problem
+from codesign_bench.task import Booleans, Floats, Singles, Task, load_task, task_names
+
+EPISODES = 4
+STEPS = 60
+"""Control steps of the rollouts that are compared; enough for tools to meet what they move."""
+FRACTIONS = (0.2, 0.5, 0.8)
+SAMPLES = 4_000
+
+
+@pytest.fixture(params=task_names())
+def task(request: pytest.FixtureRequest) -> Task:
+    """Every task, one after the other."""
+    return load_task(request.param)
+
+
+@pytest.fixture
+def cutout_task(task: Task) -> Task:
+    """Every task that has a cutout region."""
+    try:
+        task.in_cutout(task.evaluation_instances(), 0.5)
+    except UserError:
+        pytest.skip("no goal or start of this task is a position")
+    return task
+
+
+@dataclass
+class Script:
+    """What is sent to a few episodes: instances (b, I), designs (b, D), controls (T, b, C)."""
+
+    instances: Floats
+    designs: Floats
+    controls: Floats
+
+
+@dataclass
+class Recording:
+    """What came back: observations (T + 2, b, O), rewards (T, b), both ends (T, b), each up to an episode's end."""
+
+    observation: Singles
+    reward: Floats
+    terminated: Booleans
+    truncated: Booleans
+
+
+def script_for(task: Task, count: int = EPISODES, steps: int | None = None) -> Script:
+    """Return a random script of `count` episodes whose controls persist for a while, so that tools travel."""
+    rng = np.random.default_rng(5)
+    steps = min(task.horizon, STEPS) if steps is None else steps
+    held = rng.uniform(-1.0, 1.0, size=(steps // 10 + 1, count, task.control_space.size))
+    return Script(
+        task.sample_instances(rng, count),
+        rng.uniform(-1.0, 1.0, size=(count, task.design_space.size)),
+        np.repeat(held, 10, axis=0)[:steps],
+    )
+
+
+def play(episodes: Episodes, script: Script, slots: np.ndarray) -> Recording:
+    """Play the script's episodes, the first in the first of `slots`; what follows an episode's end stays zero."""
+    steps, count = script.controls.shape[:2]
+    seen = np.zeros((steps + 2, count, episodes.layout.size), dtype=np.float32)
+    recording = Recording(seen, np.zeros((steps, count)), *np.zeros((2, steps, count), dtype=bool))
+    episodes.begin(slots, script.instances)
+    seen[0] = episodes.observation[slots]
+    episodes.design(slots, script.designs)
+    seen[1] = episodes.observation[slots]
+    active = np.arange(count)
+    for step in range(steps):
+        results = episodes.control(slots[active], script.controls[step, active])
+        seen[step + 2, active] = episodes.observation[slots[active]]
+        recording.reward[step, active], recording.terminated[step, active], recording.truncated[step, active] = results
+        active = active[~(results[1] | results[2])]
+        if not active.size:
+            break
+    return recording
+
+
+def assert_equal(first: Recording, second: Recording) -> None:
+    """Assert that two recordings are the same to the last bit."""
+    for name, values in vars(first).items():
+        np.testing.assert_array_equal(values, vars(second)[name], err_msg=name)
+
+
+def one(script: Script, index: int) -> Script:
+    """Return one episode of a script."""
+    keep = slice(index, index + 1)
+    return Script(script.instances[keep], script.designs[keep], script.controls[:, keep])
+
+
+def corners(size: int) -> Floats:
+    """Return all (2^size, size) corners of [-1, 1]^size."""
+    return np.array(list(product((-1.0, 1.0), repeat=size)))
+
+
+def test_a_rollout_is_the_same_alone_in_a_batch_and_in_another_slot_order(task: Task) -> None:
+    script, slots = script_for(task), np.arange(EPISODES)
+    together = play(Episodes(task, EPISODES), script, slots)
+    wider = Episodes(task, EPISODES + 3)
+    assert_equal(together, play(wider, script, slots[::-1] + 2))
+    assert_equal(together, play(wider, script, slots))  # Slots that another episode has used before.
+    for index in range(EPISODES):
+        alone = play(Episodes(task, 1), one(script, index), np.array([0]))
+        for name, values in vars(alone).items():
+            np.testing.assert_array_equal(values[:, 0], vars(together)[name][:, index], err_msg=name)
+
+
+def test_other_controls_and_designs_make_another_rollout(task: Task) -> None:
+    script, slots = script_for(task), np.arange(EPISODES)
+    before = play(Episodes(task, EPISODES), script, slots)
+    for change in (
+        Script(script.instances, -script.designs, script.controls),
+        Script(script.instances, script.designs, -script.controls),
+    ):
+        assert not np.array_equal(before.observation, play(Episodes(task, EPISODES), change, slots).observation)
+
+
+def test_observations_and_rewards_stay_in_their_bounds(task: Task) -> None:
+    episodes = Episodes(task, EPISODES)
+    recording = play(episodes, script_for(task, steps=task.horizon), np.arange(EPISODES))
+    layout, bound = task.layout, 1.0 + 1e-5
+    assert recording.observation.shape[2] == layout.size
+    assert np.isfinite(recording.reward).all()
+    seen = recording.observation[np.abs(recording.observation).any(axis=2)]
+    for part, box in ((layout.state, task.state_space), (layout.goal, task.goal_space)):
+        assert np.abs(box.to_unit(seen[:, part])).max(initial=0.0) <= bound
+    assert np.abs(seen[:, layout.design]).max() <= 1.0
+    assert (seen[:, layout.phase.start : layout.phase.start + 2].sum(axis=1) == 1.0).all()
+
+
+def test_an_episode_ends_once_within_the_horizon(task: Task) -> None:
+    script = script_for(task, steps=task.horizon + 1)
+    recording = play(Episodes(task, EPISODES), script, np.arange(EPISODES))
+    ends = recording.terminated.astype(int) + recording.truncated
+    np.testing.assert_array_equal(ends.sum(axis=0), 1)
+    assert not ends[task.horizon :].any()
+    assert not recording.truncated[: task.horizon - 1].any()
+
+
+def test_spaces_agree_in_size(task: Task) -> None:
+    designs = task.design_space.from_unit(script_for(task).designs)
+    assert len(task.tool_graph.parameter_nodes) == task.design_space.size
+    assert set(task.tool_graph.parameter_nodes) <= set(range(task.tool_graph.num_nodes))
+    assert designs.shape == (EPISODES, task.design_space.size)
+    assert task.control_period > 0.0
+    for box in (task.design_space, task.control_space, task.instance_space, task.state_space):
+        assert np.all(box.bounds[0] < box.bounds[1])
+
+
+def test_evaluation_instances_are_fixed_different_and_inside_the_instance_space(task: Task) -> None:
+    instances = task.evaluation_instances()
+    np.testing.assert_array_equal(instances, load_task(task.name).evaluation_instances())
+    assert instances.shape == (task.num_evaluation_instances, task.instance_space.size)
+    assert len(np.unique(instances, axis=0)) == len(instances)
+    assert np.abs(task.instance_space.to_unit(instances)).max() <= 1.0
+
+
+def test_instances_follow_their_generator(task: Task) -> None:
+    first, again, other = (task.sample_instances(np.random.default_rng(seed), 8) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_actions_that_are_not_finite_are_refused(task: Task, bad: float) -> None:
+    episodes, slots = Episodes(task, 1), np.array([0])
+    script = one(script_for(task), 0)
+    episodes.begin(slots, script.instances)
+    with pytest.raises(ValueError, match="not finite"):
+        episodes.design(slots, np.full_like(script.designs, bad))
+    episodes.design(slots, script.designs)
+    with pytest.raises(ValueError, match="not finite"):
+        episodes.control(slots, np.full_like(script.controls[0], bad))
+
+
+def test_extreme_actions_act_like_the_bounds(task: Task) -> None:
+    script, slots = script_for(task, steps=20), np.arange(EPISODES)
+    wild = Script(script.instances, 100.0 * script.designs, 100.0 * script.controls)
+    tame = Script(script.instances, np.clip(wild.designs, -1.0, 1.0), np.clip(wild.controls, -1.0, 1.0))
+    assert_equal(play(Episodes(task, EPISODES), wild, slots), play(Episodes(task, EPISODES), tame, slots))
+
+
+@pytest.mark.parametrize("fraction", FRACTIONS)
+def test_training_never_sees_the_cutout_and_the_rest_as_before(cutout_task: Task, fraction: float) -> None:
+    everywhere = cutout_task.sample_instances(np.random.default_rng(1), SAMPLES)
+    kept = Problem(cutout_task, cutout=fraction).sample_instances(np.random.default_rng(2), SAMPLES)
+    assert not cutout_task.in_cutout(kept, fraction).any()
+    allowed = everywhere[~cutout_task.in_cutout(everywhere, fraction)]
+    for column in range(kept.shape[1]):  # A difference that chance makes once in a thousand samples is refused.
+        assert stats.ks_2samp(kept[:, column], allowed[:, column]).pvalue > 1e-3
+
+
+@pytest.mark.parametrize("fraction", FRACTIONS)
+def test_the_cutout_is_the_stated_share_of_the_training_region(cutout_task: Task, fraction: float) -> None:
+    instances = cutout_task.sample_instances(np.random.default_rng(3), SAMPLES)
+    excluded = cutout_task.in_cutout(instances, fraction)
+    deviation = np.sqrt(fraction * (1.0 - fraction) / SAMPLES)
+    assert excluded.mean() == pytest.approx(fraction, abs=4.0 * deviation)
+    assert (cutout_task.in_cutout(instances, min(1.0, fraction + 0.1)) >= excluded).all(), "a larger cutout holds it"
+
+
+def test_material_and_effort_are_fractions_that_reach_one(task: Task) -> None:
+    rng = np.random.default_rng(4)
+    inside = rng.uniform(-1.0, 1.0, size=(SAMPLES, task.design_space.size))
+    material = task.material(task.design_space.from_unit(np.vstack([inside, corners(task.design_space.size)])))
+    controls = rng.uniform(-1.0, 1.0, size=(SAMPLES, task.control_space.size))
+    effort = task.effort(np.vstack([controls, corners(task.control_space.size)]))
+    for used in (material, effort):
+        assert used.min() >= 0.0
+        assert used.max() == pytest.approx(1.0)
+    assert material.min() < 0.9
+    assert task.effort(np.zeros((1, task.control_space.size)))[0] < 0.5
+
+
+def test_the_tradeoff_reward_by_hand() -> None:
+    material, effort = np.array([0.5, 0.0, 1.0]), np.array([0.2, 0.0, 1.0])
+    # 2 [1 - (0.3 * 0.5 + 0.7 * 0.2)] = 2 (1 - 0.29) = 1.42; nothing used earns K; everything used earns nothing.
+    np.testing.assert_allclose(Tradeoff(alpha=0.3, scale=2.0).reward(material, effort), [1.42, 2.0, 0.0], atol=1e-12)
+
+
+def test_the_tradeoff_reward_is_added_to_every_control_step(task: Task) -> None:
+    script, slots = script_for(task), np.arange(EPISODES)
+    plain = play(Episodes(task, EPISODES), script, slots)
+    weighed = play(Episodes(task, EPISODES, Tradeoff(alpha=0.6, scale=0.5)), script, slots)
+    material = task.material(task.design_space.from_unit(script.designs))
+    running = np.cumsum(plain.terminated | plain.truncated, axis=0) - (plain.terminated | plain.truncated) == 0
+    for step in range(len(script.controls)):
+        expected = 0.5 * (1.0 - 0.6 * material - 0.4 * task.effort(script.controls[step]))
+        np.testing.assert_allclose((weighed.reward - plain.reward)[step], expected * running[step], atol=1e-9)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import torch
@@ -31,6 +32,38 @@ def linear(inputs: int, outputs: int, generator: torch.Generator, bias: bool = T
     return layer
 
 
+class _Tanh(torch.autograd.Function):
+    """tanh(x) = 2 sigmoid(2x) - 1, to 1e-7: on processors without AVX-512 over twice as fast as torch's own."""
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor) -> Tensor:
+        """Return tanh(x)."""
+        y = (x + x).sigmoid_().mul_(2.0).sub_(1.0)
+        ctx.save_for_backward(y)
+        return y
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> Tensor:
+        """Return the gradient for x: that for y times 1 - y^2."""
+        (y,) = ctx.saved_tensors
+        gradient: Tensor = torch.ops.aten.tanh_backward(gradients[0], y)
+        return gradient
+
+
+def tanh(x: Tensor) -> Tensor:
+    """Return the hyperbolic tangent of `x`, elementwise."""
+    result: Tensor = _Tanh.apply(x)
+    return result
+
+
+class Tanh(nn.Module):
+    """The hyperbolic tangent as a layer."""
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Return tanh(x), elementwise."""
+        return tanh(x)
+
+
 class MLP(nn.Sequential):
     """Tanh layers and a linear output layer, whose first weights may be scaled down."""
 
@@ -41,7 +74,7 @@ class MLP(nn.Sequential):
         for index, (inputs, outputs) in enumerate(pairwise(sizes)):
             layers.append(linear(inputs, outputs, generator))
             if index < len(sizes) - 2 or activate_last:
-                layers.append(nn.Tanh())
+                layers.append(Tanh())
         super().__init__(*layers)
         if output_scale != 1.0:
             with torch.no_grad():
@@ -76,7 +109,7 @@ class IndexMLP(nn.Module):
             # One node is an ordinary layer, for which the plain product is several times as fast as the batched one.
             x = torch.baddbmm(bias, x, weight) if len(weight) > 1 else torch.addmm(bias[0], x[0], weight[0])[None]
             if index < last:
-                x = torch.tanh(x)
+                x = tanh(x)
         return x
 
 

@@ -1,0 +1,278 @@
+"""Push against its documentation: geometry, friction, success, reward, and a physics step that is small enough.
+
+Nothing here depends on a tuned number: all of them are read from the task's module. Lengths are in m, times in s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import pairwise, product
+from typing import Any
+
+import numpy as np
+import pymunk
+import pytest
+
+from codesign_bench.episodes import Episodes
+from codesign_bench.registry import load_module
+from codesign_bench.task import Floats, load_task
+
+push: Any = load_module("tasks", "push")
+REACH = push.PUCK_RADIUS + push.LINK_HALF_WIDTH
+"""Distance of a link's core from the puck's centre when they touch."""
+SLOT = np.array([0])
+STRAIGHT = np.array([[1.0, 1.0, 1.0, 0.0, 0.0]])
+"""The longest straight tool, normalised."""
+IDLE = np.zeros((1, 2))
+
+
+@dataclass
+class Outcome:
+    """One episode: rewards, distances from puck to goal before and after every step, and how it ended."""
+
+    reward: list[float] = field(default_factory=list)
+    puck: list[Floats] = field(default_factory=list)
+    terminated: bool = False
+    success: bool = False
+
+
+def goal_at(distance: float, angle: float) -> Floats:
+    """Return the instance (1, 2) whose goal lies `distance` from the puck's start in the direction `angle`."""
+    return push.PUCK_START + distance * np.array([[np.cos(angle), np.sin(angle)]])
+
+
+def pucks(episodes: Episodes) -> Floats:
+    """Return position and velocity (b, 4) of every puck."""
+    simulator: Any = episodes.simulator
+    bodies: Floats = simulator.bodies[:, 0]
+    return bodies
+
+
+def play(
+    goal: Floats, design: Floats, controller: Callable[[Floats], Floats], kick: tuple[float, float] | None = None
+) -> Outcome:
+    """Play one episode; `controller` maps an observation (O,) to a control (1, 2); `kick` gives the puck a velocity."""
+    episodes, outcome = Episodes(load_task("push"), 1), Outcome()
+    episodes.begin(SLOT, goal)
+    episodes.design(SLOT, design)
+    outcome.puck.append(push.PUCK_START.copy())
+    if kick is not None:
+        simulator: Any = episodes.simulator
+        space: pymunk.Space = simulator.spaces[0]
+        (body,) = [body for body in space.bodies if body.body_type == pymunk.Body.DYNAMIC]
+        body.velocity = kick
+    while True:
+        reward, terminated, truncated = episodes.control(SLOT, controller(episodes.observation[0].astype(float)))
+        outcome.reward.append(float(reward[0]))
+        outcome.puck.append(pucks(episodes)[0, :2].copy())
+        if terminated[0] or truncated[0]:
+            outcome.terminated, outcome.success = bool(terminated[0]), bool(episodes.success(SLOT)[0])
+            return outcome
+
+
+def stay(observation: Floats) -> Floats:
+    """Hold the tool still."""
+    return IDLE
+
+
+def push_left(observation: Floats) -> Floats:
+    """Push a straight tool left, slower the nearer the goal, so that the puck stops with the tool."""
+    left = float(observation[6])
+    return np.array([[np.clip(0.25 * left, -0.5, 0.0), 0.0]])
+
+
+def segment_distance(point: Floats, start: Floats, end: Floats) -> float:
+    """Return the distance of a point from a segment."""
+    along = np.clip((point - start) @ (end - start) / ((end - start) @ (end - start)), 0.0, 1.0)
+    return float(np.linalg.norm(start + along * (end - start) - point))
+
+
+def gap(chain: Floats, base: Floats, puck: Floats) -> float:
+    """Return the free distance between a puck and the tool whose chain (4, 2) is held at `base`."""
+    return min(segment_distance(puck, *ends) for ends in pairwise(chain + base)) - REACH
+
+
+def many_designs(count: int) -> Floats:
+    """Return all corners of the design space and `count` designs inside, in its units."""
+    space = load_task("push").design_space
+    inside = np.random.default_rng(7).uniform(-1.0, 1.0, size=(count, space.size))
+    return space.from_unit(np.vstack([list(product((-1.0, 1.0), repeat=space.size)), inside]))
+
+
+def test_the_docstring_tells_the_constants() -> None:
+    task = load_task("push")
+    text = " ".join(str(task.__doc__).split())
+    near, far = push.GOAL_DISTANCE
+    x, y = push.PUCK_START
+    held_x, held_y = push.TOOL_START
+    goals = task.instance_space
+    for told in (
+        f"velocity of the held end, +-{push.MAX_SPEED:g} m/s",
+        f"Positions {near:g} to {far:g} m from the puck's start",
+        f"goal position x, y | m | {goals.low[0]:g} .. {goals.high[0]:g} and {goals.low[1]:g} .. {goals.high[1]:g}",
+        f"{push.TABLE.slack_reward:+g} per control step".replace("-", "- "),
+        f"+{push.SUCCESS_REWARD:g} on success",
+        f"Puck at rest at ({x:g}, {y:g}), held end at ({held_x:g}, {held_y:g})",
+        f"{push.START_CLEARANCE:g} m clear",
+        f"within {push.GOAL_RADIUS:g} m of the goal and slower than {push.REST_SPEED:g} m/s",
+        f"for {push.REST_STEPS} control steps",
+        f"{task.horizon} control steps of 1/{1.0 / task.control_period:g} s",
+        *(
+            f"{what} x, y | {unit} | {low:g} .. {high:g}"
+            for what, unit, index in (
+                ("puck position", "m", 0),
+                ("puck velocity", "m/s", 2),
+                ("from puck to goal", "m", 6),
+            )
+            for low, high in [(task.state_space.low[index], task.state_space.high[index])]
+        ),
+    ):
+        assert told in text, told
+
+
+def test_chain_points_by_hand() -> None:
+    quarter = np.pi / 2.0
+    straight = push.chain_points(np.array([[1.0, 2.0, 3.0, 0.0, 0.0]]), 0.0)
+    np.testing.assert_allclose(straight, [[[0, 0], [1, 0], [3, 0], [6, 0]]], atol=1e-12)
+    stairs = push.chain_points(np.array([[1.0, 2.0, 3.0, quarter, -quarter]]), 0.0)
+    np.testing.assert_allclose(stairs, [[[0, 0], [1, 0], [1, 2], [4, 2]]], atol=1e-12)
+    hook = push.chain_points(np.array([[1.0, 2.0, 3.0, quarter, quarter]]), np.pi)
+    np.testing.assert_allclose(hook, [[[0, 0], [-1, 0], [-1, -2], [2, -2]]], atol=1e-12)
+
+
+def test_no_tool_starts_on_the_puck() -> None:
+    designs = many_designs(2_000)
+    chains = push.chain_points(designs, push.FIRST_LINK_ANGLE)
+    shifts = push.start_shift(chains)
+    right = np.array([1.0, 0.0])
+    for chain, shift in zip(chains, shifts, strict=True):
+        start = push.TOOL_START + shift * right
+        assert gap(chain, start, push.PUCK_START) >= push.START_CLEARANCE - 1e-9
+        if shift > 0.0:  # It is not moved further than needed.
+            assert gap(chain, start - 1e-4 * right, push.PUCK_START) < push.START_CLEARANCE
+    assert (shifts == 0.0).any()
+    assert (shifts > 0.0).any()
+    assert push.TOOL_START[0] + shifts.max() <= push.WORKSPACE.high[0]
+
+
+def test_the_simulator_starts_tools_where_the_geometry_says() -> None:
+    designs, task = many_designs(50), load_task("push")
+    episodes, slots = Episodes(task, len(designs)), np.arange(len(designs))
+    episodes.begin(slots, np.tile(goal_at(push.GOAL_DISTANCE[0], 0.0), (len(designs), 1)))
+    episodes.design(slots, task.design_space.to_unit(designs))
+    shifts = push.start_shift(push.chain_points(designs, push.FIRST_LINK_ANGLE))
+    np.testing.assert_allclose(episodes.observation[:, 4], push.TOOL_START[0] + shifts, atol=1e-5)
+    np.testing.assert_allclose(episodes.observation[:, 5], push.TOOL_START[1], atol=1e-5)
+    for slot in slots:  # pymunk's own shapes leave the clearance, too.
+        simulator: Any = episodes.simulator
+        space: pymunk.Space = simulator.spaces[slot]
+        space.step(1e-9)
+        links = [shape for shape in space.shapes if isinstance(shape, pymunk.Segment)]
+        assert len(links) == 3
+        free = min(link.point_query(tuple(push.PUCK_START)).distance for link in links) - push.PUCK_RADIUS
+        assert free >= push.START_CLEARANCE - 1e-6
+
+
+def test_goals_lie_in_the_ring_uniform_in_area() -> None:
+    goals = load_task("push").sample_instances(np.random.default_rng(0), 20_000)
+    distance = np.linalg.norm(goals - push.PUCK_START, axis=1)
+    near, far = push.GOAL_DISTANCE
+    assert near <= distance.min() <= distance.max() <= far
+    middle = np.sqrt(0.5 * (near**2 + far**2))  # This circle halves the ring's area.
+    assert (distance < middle).mean() == pytest.approx(0.5, abs=0.015)
+    assert (goals[:, 0] > push.PUCK_START[0]).mean() == pytest.approx(0.5, abs=0.015)
+
+
+def test_a_straight_tool_pushes_the_puck_left_into_the_goal() -> None:
+    outcome = play(goal_at(np.mean(push.GOAL_DISTANCE), np.pi), STRAIGHT, push_left)
+    assert outcome.success
+    assert outcome.terminated
+    assert len(outcome.reward) - 1 < load_task("push").horizon
+    assert sum(outcome.reward) > push.SUCCESS_REWARD
+    assert outcome.reward[-1] > 0.5 * push.SUCCESS_REWARD
+    assert max(outcome.reward[:-1]) < 0.5 * push.SUCCESS_REWARD
+
+
+def test_nothing_happens_to_an_idle_tool() -> None:
+    task = load_task("push")
+    outcome = play(goal_at(push.GOAL_DISTANCE[0], 0.0), STRAIGHT, stay)
+    assert not outcome.terminated
+    assert len(outcome.reward) == task.horizon
+    np.testing.assert_allclose(outcome.puck[-1], push.PUCK_START, atol=1e-9)
+    assert sum(outcome.reward) == pytest.approx(task.horizon * push.TABLE.slack_reward)
+
+
+def speed_for(distance: float) -> float:
+    """Return the speed from which the table's friction stops a puck after `distance`: v^2 / 2a."""
+    return float(np.sqrt(2.0 * push.PUCK_DECELERATION * distance))
+
+
+@pytest.mark.parametrize("angle", [np.pi, 0.5 * np.pi, 0.75 * np.pi])
+def test_a_sliding_puck_stops_by_the_documented_friction(angle: float) -> None:
+    speed = speed_for(3.0)
+    direction = np.array([np.cos(angle), np.sin(angle)])
+    outcome = play(goal_at(push.GOAL_DISTANCE[1], -angle), STRAIGHT, stay, kick=tuple((speed * direction).tolist()))
+    np.testing.assert_allclose(outcome.puck[-1], outcome.puck[-2], atol=1e-9)
+    # Semi-implicit steps are off by up to the way of one of them.
+    np.testing.assert_allclose(outcome.puck[-1] - push.PUCK_START, 3.0 * direction, atol=speed * push.PHYSICS_PERIOD)
+
+
+def test_a_puck_that_stops_at_the_goal_succeeds_and_one_that_passes_through_does_not() -> None:
+    distance = push.GOAL_DISTANCE[0]
+    goal = goal_at(distance, np.pi)
+    stops = play(goal, STRAIGHT, stay, kick=(-speed_for(distance), 0.0))
+    passes = play(goal, STRAIGHT, stay, kick=(-speed_for(distance + push.GOAL_RADIUS + 1.0), 0.0))
+    assert stops.success
+    assert not passes.success
+    nearest = min(np.linalg.norm(puck - goal[0]) for puck in passes.puck)
+    assert nearest < push.GOAL_RADIUS, "it did pass through the goal"
+
+
+@pytest.mark.parametrize("kick", [(-4.0, 0.0), (-5.0, 5.0), (0.0, -6.0)])
+def test_rewards_add_up_to_the_share_of_the_way_made(kick: tuple[float, float]) -> None:
+    goal = goal_at(push.GOAL_DISTANCE[1], 0.8 * np.pi)
+    outcome = play(goal, STRAIGHT, push_left, kick=kick)
+    first, last = (float(np.linalg.norm(puck - goal[0])) for puck in (outcome.puck[0], outcome.puck[-1]))
+    steps = len(outcome.reward)
+    expected = (first - last) / first + push.TABLE.slack_reward * steps + push.SUCCESS_REWARD * outcome.success
+    assert sum(outcome.reward) == pytest.approx(expected, abs=1e-9)
+
+
+def test_half_the_physics_step_leaves_the_outcome_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    goals = [goal_at(distance, np.pi) for distance in push.GOAL_DISTANCE]
+    coarse = [play(goal, STRAIGHT, push_left) for goal in goals]
+    monkeypatch.setattr(push, "PHYSICS_PERIOD", 0.5 * push.PHYSICS_PERIOD)
+    monkeypatch.setattr(push, "PHYSICS_STEPS", 2 * push.PHYSICS_STEPS)
+    fine = [play(goal, STRAIGHT, push_left) for goal in goals]
+    for before, after in zip(coarse, fine, strict=True):
+        assert before.success
+        assert after.success
+        assert abs(len(before.reward) - len(after.reward)) <= 3  # Control steps.
+        np.testing.assert_allclose(before.puck[-1], after.puck[-1], atol=0.1)  # A tenth of the puck's radius.
+
+
+def test_nothing_explodes_or_tunnels_at_the_corners_of_the_design_space() -> None:
+    task = load_task("push")
+    designs = np.array(list(product((-1.0, 1.0), repeat=task.design_space.size)))
+    chains = push.chain_points(task.design_space.from_unit(designs), push.FIRST_LINK_ANGLE)
+    rng, slots = np.random.default_rng(3), np.arange(len(designs))
+    episodes = Episodes(task, len(designs))
+    episodes.begin(slots, task.sample_instances(rng, len(designs)))
+    episodes.design(slots, designs)
+    simulator: Any = episodes.simulator
+    fastest, deepest, moved = 0.0, 0.0, np.zeros(len(designs), dtype=bool)
+    for step in range(task.horizon):
+        if step % 10 == 0:
+            controls = np.sign(rng.uniform(-1.0, 1.0, size=(len(designs), 2)))
+            controls[:, 0] = -1.0 if step < 60 else controls[:, 0]
+        simulator.step(slots, controls)  # Goes on behind a success, too.
+        bodies = simulator.bodies
+        assert np.isfinite(bodies).all()
+        fastest = max(fastest, float(np.linalg.norm(bodies[:, 0, 2:], axis=1).max()))
+        deepest = min(deepest, *(gap(chains[i], bodies[i, 1, :2], bodies[i, 0, :2]) for i in slots))
+        moved |= np.linalg.norm(bodies[:, 0, :2] - push.PUCK_START, axis=1) > 0.1
+    assert moved.mean() > 0.5, "most tools met the puck"
+    # Links have no bounce: the puck is no faster than the held end can be, along the diagonal.
+    assert fastest <= 1.05 * np.sqrt(2.0) * push.MAX_SPEED
+    assert deepest >= -push.LINK_HALF_WIDTH, "the puck's edge never reaches a link's core"

@@ -238,7 +238,9 @@ def test_the_tradeoff_reward_is_added_to_every_control_step(task: Task) -> None:
     plain = play(Episodes(task, EPISODES), script, slots)
     weighed = play(Episodes(task, EPISODES, Tradeoff(alpha=0.6, scale=0.5)), script, slots)
     material = task.material(task.design_space.from_unit(script.designs))
-    running = np.cumsum(plain.terminated | plain.truncated, axis=0) - (plain.terminated | plain.truncated) == 0
+    running: Booleans = (
+        np.cumsum(plain.terminated | plain.truncated, axis=0) - (plain.terminated | plain.truncated) == 0
+    )
     for step in range(len(script.controls)):
         expected = 0.5 * (1.0 - 0.6 * material - 0.4 * task.effort(script.controls[step]))
         np.testing.assert_allclose((weighed.reward - plain.reward)[step], expected * running[step], atol=1e-9)

@@ -1,0 +1,163 @@
+"""Each of the paper's methods is what it says: the baselines' limits are real, and so is their strength.
+
+This file names methods; what holds for all of them is in `test_contract.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from codesign_bench.config import resolve
+from codesign_bench.episodes import Episodes
+from codesign_bench.learning.actor import Actor
+from codesign_bench.method import Method, load_method
+from codesign_bench.profiles import PROFILES
+from codesign_bench.seeding import Streams
+from codesign_bench.task import Singles, Task, load_task, task_names
+
+MakeMethod = Callable[..., Method[Any]]
+PPO_BASED = ("gnn_ppo", "shared_arch", "hwasp_minimal")
+BUDGET = 10_000
+
+
+def starts(task: Task, count: int = 16) -> Singles:
+    """Return observations (B, O) of the design phase for different goals."""
+    episodes = Episodes(task, count)
+    episodes.begin(np.arange(count), task.sample_instances(np.random.default_rng(1), count))
+    return episodes.observation.copy()
+
+
+def trained(make_method: MakeMethod, name: str) -> Method[Any]:
+    """Return a method after two small batches."""
+    method = make_method(name)
+    for _ in range(2):
+        method.train(BUDGET)
+    return method
+
+
+@pytest.mark.parametrize("name", ["cma_rl", "hwasp_minimal", "cma_es"])
+def test_one_design_for_all_goals(make_method: MakeMethod, push: Task, name: str) -> None:
+    designs = trained(make_method, name).policy().design(starts(push))
+    assert (designs == designs[0]).all()
+    assert designs[0].any(), "it has moved from the middle of the design space"
+
+
+@pytest.mark.parametrize("name", ["gnn_ppo", "shared_arch"])
+def test_goal_conditioned_designers_design_by_goal(make_method: MakeMethod, push: Task, name: str) -> None:
+    designs = trained(make_method, name).policy().design(starts(push))
+    assert len(np.unique(designs, axis=0)) == len(designs)
+
+
+@pytest.mark.parametrize("name", ["gnn_ppo", "shared_arch", "cma_rl", "hwasp_minimal"])
+def test_controllers_see_the_goal_and_the_design(make_method: MakeMethod, push: Task, name: str) -> None:
+    policy, layout = trained(make_method, name).policy(), push.layout
+    seen = np.repeat(starts(push, 1), 3, axis=0)
+    seen[:, layout.phase] = (0.0, 1.0, 0.0)
+    seen[1, layout.goal] += 1.0
+    seen[2, layout.design] = 0.5
+    controls = policy.act(seen)
+    assert not np.array_equal(controls[0], controls[1])
+    assert not np.array_equal(controls[0], controls[2])
+
+
+def test_the_single_trajectory_is_open_loop(make_method: MakeMethod, push: Task) -> None:
+    policy, layout = trained(make_method, "cma_es").policy(), push.layout
+    rng = np.random.default_rng(0)
+    seen = rng.normal(size=(push.horizon, layout.size)).astype(np.float32)
+    seen[:, layout.phase.stop - 1] = np.arange(push.horizon, dtype=np.float32) / np.float32(push.horizon)
+    other = seen.copy()
+    other[:, : layout.phase.stop - 1] = 0.0
+    np.testing.assert_array_equal(policy.act(seen), policy.act(other))
+    plan = policy.tensors()["plan"]
+    assert plan.size == push.design_space.size + push.horizon * push.control_space.size
+    np.testing.assert_allclose(policy.act(seen).ravel(), plan[push.design_space.size :], atol=1e-6)
+    np.testing.assert_allclose(policy.design(seen[0]), plan[: push.design_space.size], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", PPO_BASED)
+def test_the_paper_trains_both_phases_jointly(push: Task, name: str) -> None:
+    assert resolve(load_method(name), push.name, "paper").method.design_credit == "joint"
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_goal_conditioned_methods_share_optimiser_settings_unless_told(push: Task, profile: str) -> None:
+    ours, single = (resolve(load_method(name), push.name, profile).method for name in ("gnn_ppo", "hwasp_minimal"))
+    if profile == "paper":  # "The same hyperparameters" (the paper's appendix on the baselines).
+        assert all(getattr(ours, field.name) == getattr(single, field.name) for field in fields(single))
+    assert ours.batch_size == single.batch_size
+
+
+def count(parameters: Any) -> int:
+    """Return how many numbers are trained among the parameters of a module."""
+    return sum(parameter.numel() for parameter in parameters if parameter.requires_grad)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("task_name", task_names())
+def test_the_shared_architecture_has_at_least_as_many_parameters(task_name: str, profile: str) -> None:
+    task, policies, wholes = load_task(task_name), [], []
+    for name in ("gnn_ppo", "shared_arch"):
+        method_class: Any = load_method(name)
+        config, streams = resolve(method_class, task_name, profile).method, Streams(0)
+        actor: Actor = method_class.make_actor(task, config, streams["policy weights"])
+        value: torch.nn.Module = method_class.make_value(task, config, streams["value weights"])
+        policies.append(count(actor.parameters()))
+        wholes.append(count(actor.parameters()) + count(value.parameters()))
+    assert policies[1] >= policies[0]
+    assert wholes[1] >= wholes[0]
+
+
+def test_cma_rl_judges_every_candidate_by_its_mean_return(make_method: MakeMethod) -> None:
+    method: Any = make_method("cma_rl")
+    candidates = method.evolution.ask()
+    told: list[Any] = []
+    tell = method.evolution.tell
+    method.evolution.tell = lambda fitness: (told.append(fitness), tell(fitness))
+    _, batch = play(method)
+    (fitness,) = told
+    returns: dict[int, list[float]] = {}
+    for slot in range(len(batch.valid)):
+        begins = np.flatnonzero(batch.is_design[slot]).tolist()
+        for begin, end in zip(begins, [*begins[1:], batch.valid.shape[1]], strict=True):
+            (candidate,) = np.flatnonzero(np.isclose(candidates, batch.design[slot, begin], atol=1e-6).all(axis=1))
+            returns.setdefault(int(candidate), []).append(float(batch.reward[slot, begin:end].sum()))
+    np.testing.assert_allclose(fitness, [np.mean(returns[index]) for index in range(len(candidates))], atol=1e-9)
+
+
+def play(method: Any) -> Any:
+    """Train one batch of `cma_rl` and return what its learner collected."""
+    kept: list[Any] = []
+    train = method.learner.train
+
+    def remember(remaining_steps: int) -> Any:
+        kept.append(train(remaining_steps))
+        return kept[-1]
+
+    method.learner.train = remember
+    method.train(BUDGET)
+    return kept[0]
+
+
+def test_cma_es_judges_all_candidates_of_a_generation_on_the_same_instances(
+    make_method: MakeMethod, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    method: Any = make_method("cma_es", episodes_per_candidate=2)
+    begun: list[Any] = []
+    begin = Episodes.begin
+
+    def remember(self: Episodes, slots: Any, instances: Any) -> None:
+        begun.append(instances)
+        begin(self, slots, instances)
+
+    monkeypatch.setattr(Episodes, "begin", remember)
+    method.train(BUDGET)
+    (instances,) = begun
+    by_candidate = instances.reshape(method.config.popsize, 2, -1)
+    assert (by_candidate == by_candidate[0]).all()
+    assert not np.array_equal(by_candidate[0, 0], by_candidate[0, 1])

@@ -5,6 +5,8 @@ Nothing here depends on a tuned number: all of them are read from the task's mod
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise, product
@@ -25,6 +27,8 @@ SLOT = np.array([0])
 STRAIGHT = np.array([[1.0, 1.0, 1.0, 0.0, 0.0]])
 """The longest straight tool, normalised."""
 IDLE = np.zeros((1, 2))
+SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
+"""A title in the docstring and the indented text below it."""
 
 
 @dataclass
@@ -42,33 +46,44 @@ def goal_at(distance: float, angle: float) -> Floats:
     return push.PUCK_START + distance * np.array([[np.cos(angle), np.sin(angle)]])
 
 
-def pucks(episodes: Episodes) -> Floats:
-    """Return position and velocity (b, 4) of every puck."""
-    simulator: Any = episodes.simulator
-    bodies: Floats = simulator.bodies[:, 0]
-    return bodies
+def play(goal: Floats, controller: Callable[[Floats], Floats], prepare: Callable[[pymunk.Space], None]) -> Outcome:
+    """Play one episode with the straight tool.
 
-
-def play(
-    goal: Floats, design: Floats, controller: Callable[[Floats], Floats], kick: tuple[float, float] | None = None
-) -> Outcome:
-    """Play one episode; `controller` maps an observation (O,) to a control (1, 2); `kick` gives the puck a velocity."""
+    `controller` maps an observation (O,) to a control (1, 2); `prepare` may change the scene after the design step.
+    """
     episodes, outcome = Episodes(load_task("push"), 1), Outcome()
+    simulator: Any = episodes.simulator
     episodes.begin(SLOT, goal)
-    episodes.design(SLOT, design)
+    episodes.design(SLOT, STRAIGHT)
+    prepare(simulator.spaces[0])
     outcome.puck.append(push.PUCK_START.copy())
-    if kick is not None:
-        simulator: Any = episodes.simulator
-        space: pymunk.Space = simulator.spaces[0]
-        (body,) = [body for body in space.bodies if body.body_type == pymunk.Body.DYNAMIC]
-        body.velocity = kick
     while True:
         reward, terminated, truncated = episodes.control(SLOT, controller(episodes.observation[0].astype(float)))
         outcome.reward.append(float(reward[0]))
-        outcome.puck.append(pucks(episodes)[0, :2].copy())
+        outcome.puck.append(simulator.bodies[0, 0, :2].copy())
         if terminated[0] or truncated[0]:
             outcome.terminated, outcome.success = bool(terminated[0]), bool(episodes.success(SLOT)[0])
             return outcome
+
+
+def as_built(space: pymunk.Space) -> None:
+    """Leave a scene as it is."""
+
+
+def slide(speed: float, angle: float) -> Callable[[pymunk.Space], None]:
+    """Return a function that takes the tool off the table and gives the puck a velocity."""
+
+    def prepare(space: pymunk.Space) -> None:
+        space.remove(*links_of(space))
+        (puck,) = [body for body in space.bodies if body.body_type == pymunk.Body.DYNAMIC]
+        puck.velocity = (speed * np.cos(angle), speed * np.sin(angle))
+
+    return prepare
+
+
+def links_of(space: pymunk.Space) -> list[pymunk.Segment]:
+    """Return the shapes of a scene's tool."""
+    return [shape for shape in space.shapes if isinstance(shape, pymunk.Segment)]
 
 
 def stay(observation: Floats) -> Floats:
@@ -77,9 +92,17 @@ def stay(observation: Floats) -> Floats:
 
 
 def push_left(observation: Floats) -> Floats:
-    """Push a straight tool left, slower the nearer the goal, so that the puck stops with the tool."""
-    left = float(observation[6])
-    return np.array([[np.clip(0.25 * left, -0.5, 0.0), 0.0]])
+    """Bring the tip of a straight tool to the right of the puck, push left, and stop near the goal."""
+    puck, base, to_goal = observation[0:2], observation[4:6], observation[6:8]
+    length = sum(load_task("push").design_space.high[:3])
+    behind = puck + np.array([REACH + length + 0.2, 0.0])
+    aligned = abs(base[1] - puck[1]) < 0.05
+    if not aligned:  # First to the right, where the tool is clear of the puck, then to the puck's height.
+        way = behind - base
+        way[1] *= abs(way[0]) < 0.1
+        return np.clip(way, -0.2, 0.2)[None] / 0.2
+    near = np.linalg.norm(to_goal) < 0.6 * push.GOAL_RADIUS
+    return IDLE if near else np.array([[-0.5, 0.0]])
 
 
 def segment_distance(point: Floats, start: Floats, end: Floats) -> float:
@@ -102,33 +125,32 @@ def many_designs(count: int) -> Floats:
 
 def test_the_docstring_tells_the_constants() -> None:
     task = load_task("push")
-    text = " ".join(str(task.__doc__).split())
-    near, far = push.GOAL_DISTANCE
-    x, y = push.PUCK_START
-    held_x, held_y = push.TOOL_START
-    goals = task.instance_space
-    for told in (
-        f"velocity of the held end, +-{push.MAX_SPEED:g} m/s",
-        f"Positions {near:g} to {far:g} m from the puck's start",
-        f"goal position x, y | m | {goals.low[0]:g} .. {goals.high[0]:g} and {goals.low[1]:g} .. {goals.high[1]:g}",
-        f"{push.TABLE.slack_reward:+g} per control step".replace("-", "- "),
-        f"+{push.SUCCESS_REWARD:g} on success",
-        f"Puck at rest at ({x:g}, {y:g}), held end at ({held_x:g}, {held_y:g})",
-        f"{push.START_CLEARANCE:g} m clear",
-        f"within {push.GOAL_RADIUS:g} m of the goal and slower than {push.REST_SPEED:g} m/s",
-        f"for {push.REST_STEPS} control steps",
-        f"{task.horizon} control steps of 1/{1.0 / task.control_period:g} s",
-        *(
-            f"{what} x, y | {unit} | {low:g} .. {high:g}"
-            for what, unit, index in (
-                ("puck position", "m", 0),
-                ("puck velocity", "m/s", 2),
-                ("from puck to goal", "m", 6),
-            )
-            for low, high in [(task.state_space.low[index], task.state_space.high[index])]
+    text = inspect.cleandoc(str(task.__doc__))
+    sections = {title: " ".join(body.split()) for title, body in SECTION.findall(text)}
+    (near, far), goals, state = push.GOAL_DISTANCE, task.goal_space, task.state_space
+    for title, numbers in {
+        "Action space": (f"+-{push.MAX_SPEED:g} m/s",),
+        "Observation": (
+            f"| {state.low[0]:g} .. {state.high[0]:g} |",
+            f"| {state.low[2]:g} .. {state.high[2]:g} |",
+            f"| {state.low[6]:g} .. {state.high[6]:g} |",
+            f"| {goals.low[0]:g} .. {goals.high[0]:g} and {goals.low[1]:g} .. {goals.high[1]:g} |",
         ),
-    ):
-        assert told in text, told
+        "Goal space": (f"{near:g} to {far:g} m",),
+        "Reward": (f"{-push.TABLE.slack_reward:g} per control step", f"+{push.SUCCESS_REWARD:g} on success"),
+        "Starting state": (
+            "({:g}, {:g})".format(*push.PUCK_START),
+            "({:g}, {:g})".format(*push.TOOL_START),
+            f"{push.START_CLEARANCE:g} m",
+        ),
+        "Episode end": (
+            f"within {push.GOAL_RADIUS:g} m",
+            f"{push.REST_SPEED:g} m/s",
+            f"{push.REST_STEPS} control steps",
+            f"{task.horizon} control steps of 1/{1.0 / task.control_period:g} s",
+        ),
+    }.items():
+        assert [number for number in numbers if number not in sections[title]] == [], title
 
 
 def test_chain_points_by_hand() -> None:
@@ -142,18 +164,28 @@ def test_chain_points_by_hand() -> None:
 
 
 def test_no_tool_starts_on_the_puck() -> None:
-    designs = many_designs(2_000)
-    chains = push.chain_points(designs, push.FIRST_LINK_ANGLE)
+    chains = push.chain_points(many_designs(2_000), push.FIRST_LINK_ANGLE)
     shifts = push.start_shift(chains)
-    right = np.array([1.0, 0.0])
     for chain, shift in zip(chains, shifts, strict=True):
-        start = push.TOOL_START + shift * right
-        assert gap(chain, start, push.PUCK_START) >= push.START_CLEARANCE - 1e-9
-        if shift > 0.0:  # It is not moved further than needed.
-            assert gap(chain, start - 1e-4 * right, push.PUCK_START) < push.START_CLEARANCE
+        assert gap(chain, started(shift), push.PUCK_START) >= push.START_CLEARANCE - 1e-9
     assert (shifts == 0.0).any()
-    assert (shifts > 0.0).any()
-    assert push.TOOL_START[0] + shifts.max() <= push.WORKSPACE.high[0]
+    assert (shifts != 0.0).any()
+    low, high = push.WORKSPACE.low[0], push.WORKSPACE.high[0]
+    assert low <= push.TOOL_START[0] + shifts.min() <= push.TOOL_START[0] + shifts.max() <= high
+
+
+def test_tools_are_moved_no_further_than_needed() -> None:
+    chains = push.chain_points(many_designs(200), push.FIRST_LINK_ANGLE)
+    for chain, shift in zip(chains, push.start_shift(chains), strict=True):
+        for nearer in np.linspace(-1.0, 1.0, 41) * (abs(shift) - 1e-4):
+            if shift != 0.0:
+                assert gap(chain, started(nearer), push.PUCK_START) < push.START_CLEARANCE
+
+
+def started(shift: float) -> Floats:
+    """Return where a tool that is moved by `shift` is held."""
+    held: Floats = push.TOOL_START + np.array([shift, 0.0])
+    return held
 
 
 def test_the_simulator_starts_tools_where_the_geometry_says() -> None:
@@ -168,7 +200,7 @@ def test_the_simulator_starts_tools_where_the_geometry_says() -> None:
         simulator: Any = episodes.simulator
         space: pymunk.Space = simulator.spaces[slot]
         space.step(1e-9)
-        links = [shape for shape in space.shapes if isinstance(shape, pymunk.Segment)]
+        links = links_of(space)
         assert len(links) == 3
         free = min(link.point_query(tuple(push.PUCK_START)).distance for link in links) - push.PUCK_RADIUS
         assert free >= push.START_CLEARANCE - 1e-6
@@ -185,7 +217,7 @@ def test_goals_lie_in_the_ring_uniform_in_area() -> None:
 
 
 def test_a_straight_tool_pushes_the_puck_left_into_the_goal() -> None:
-    outcome = play(goal_at(np.mean(push.GOAL_DISTANCE), np.pi), STRAIGHT, push_left)
+    outcome = play(goal_at(np.mean(push.GOAL_DISTANCE), np.pi), push_left, as_built)
     assert outcome.success
     assert outcome.terminated
     assert len(outcome.reward) - 1 < load_task("push").horizon
@@ -196,7 +228,7 @@ def test_a_straight_tool_pushes_the_puck_left_into_the_goal() -> None:
 
 def test_nothing_happens_to_an_idle_tool() -> None:
     task = load_task("push")
-    outcome = play(goal_at(push.GOAL_DISTANCE[0], 0.0), STRAIGHT, stay)
+    outcome = play(goal_at(push.GOAL_DISTANCE[0], 0.0), stay, as_built)
     assert not outcome.terminated
     assert len(outcome.reward) == task.horizon
     np.testing.assert_allclose(outcome.puck[-1], push.PUCK_START, atol=1e-9)
@@ -212,7 +244,7 @@ def speed_for(distance: float) -> float:
 def test_a_sliding_puck_stops_by_the_documented_friction(angle: float) -> None:
     speed = speed_for(3.0)
     direction = np.array([np.cos(angle), np.sin(angle)])
-    outcome = play(goal_at(push.GOAL_DISTANCE[1], -angle), STRAIGHT, stay, kick=tuple((speed * direction).tolist()))
+    outcome = play(goal_at(push.GOAL_DISTANCE[1], angle + np.pi), stay, slide(speed, angle))
     np.testing.assert_allclose(outcome.puck[-1], outcome.puck[-2], atol=1e-9)
     # Semi-implicit steps are off by up to the way of one of them.
     np.testing.assert_allclose(outcome.puck[-1] - push.PUCK_START, 3.0 * direction, atol=speed * push.PHYSICS_PERIOD)
@@ -221,18 +253,18 @@ def test_a_sliding_puck_stops_by_the_documented_friction(angle: float) -> None:
 def test_a_puck_that_stops_at_the_goal_succeeds_and_one_that_passes_through_does_not() -> None:
     distance = push.GOAL_DISTANCE[0]
     goal = goal_at(distance, np.pi)
-    stops = play(goal, STRAIGHT, stay, kick=(-speed_for(distance), 0.0))
-    passes = play(goal, STRAIGHT, stay, kick=(-speed_for(distance + push.GOAL_RADIUS + 1.0), 0.0))
+    stops = play(goal, stay, slide(speed_for(distance), np.pi))
+    passes = play(goal, stay, slide(speed_for(distance + push.GOAL_RADIUS + 1.0), np.pi))
     assert stops.success
     assert not passes.success
     nearest = min(np.linalg.norm(puck - goal[0]) for puck in passes.puck)
     assert nearest < push.GOAL_RADIUS, "it did pass through the goal"
 
 
-@pytest.mark.parametrize("kick", [(-4.0, 0.0), (-5.0, 5.0), (0.0, -6.0)])
-def test_rewards_add_up_to_the_share_of_the_way_made(kick: tuple[float, float]) -> None:
+@pytest.mark.parametrize("prepare", [as_built, slide(4.0, np.pi), slide(6.0, 0.7 * np.pi), slide(6.0, 0.0)])
+def test_rewards_add_up_to_the_share_of_the_way_made(prepare: Callable[[pymunk.Space], None]) -> None:
     goal = goal_at(push.GOAL_DISTANCE[1], 0.8 * np.pi)
-    outcome = play(goal, STRAIGHT, push_left, kick=kick)
+    outcome = play(goal, push_left, prepare)
     first, last = (float(np.linalg.norm(puck - goal[0])) for puck in (outcome.puck[0], outcome.puck[-1]))
     steps = len(outcome.reward)
     expected = (first - last) / first + push.TABLE.slack_reward * steps + push.SUCCESS_REWARD * outcome.success
@@ -241,10 +273,10 @@ def test_rewards_add_up_to_the_share_of_the_way_made(kick: tuple[float, float]) 
 
 def test_half_the_physics_step_leaves_the_outcome_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     goals = [goal_at(distance, np.pi) for distance in push.GOAL_DISTANCE]
-    coarse = [play(goal, STRAIGHT, push_left) for goal in goals]
+    coarse = [play(goal, push_left, as_built) for goal in goals]
     monkeypatch.setattr(push, "PHYSICS_PERIOD", 0.5 * push.PHYSICS_PERIOD)
     monkeypatch.setattr(push, "PHYSICS_STEPS", 2 * push.PHYSICS_STEPS)
-    fine = [play(goal, STRAIGHT, push_left) for goal in goals]
+    fine = [play(goal, push_left, as_built) for goal in goals]
     for before, after in zip(coarse, fine, strict=True):
         assert before.success
         assert after.success
@@ -264,8 +296,8 @@ def test_nothing_explodes_or_tunnels_at_the_corners_of_the_design_space() -> Non
     fastest, deepest, moved = 0.0, 0.0, np.zeros(len(designs), dtype=bool)
     for step in range(task.horizon):
         if step % 10 == 0:
-            controls = np.sign(rng.uniform(-1.0, 1.0, size=(len(designs), 2)))
-            controls[:, 0] = -1.0 if step < 60 else controls[:, 0]
+            aim = simulator.bodies[:, 0, :2] + rng.normal(scale=4.0, size=(len(designs), 2))
+            controls = np.sign(aim - simulator.bodies[:, 1, :2])  # At full speed to somewhere around the puck.
         simulator.step(slots, controls)  # Goes on behind a success, too.
         bodies = simulator.bodies
         assert np.isfinite(bodies).all()

@@ -1,0 +1,92 @@
+"""Measure stable-baselines3's PPO and this project's on the pendulum, side by side: run this file, with that package.
+
+It writes `tests/data/pendulum_stable_baselines3.json`. About a minute a run; `python measure_pendulum.py 0 1 2` names
+the seeds. Both are judged on the same start states, acting with the mean.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import stable_baselines3
+import torch
+from pendulum import BUDGET, ENVIRONMENT, MAX_TORQUE, OURS, STABLE_BASELINES3, Pendulum, train
+from stable_baselines3.common.env_util import make_vec_env
+
+from codesign_bench.evaluate import evaluate
+from codesign_bench.method import Policy
+from codesign_bench.task import Singles
+
+RECORD = Path(__file__).resolve().parent.parent / "data" / "pendulum_stable_baselines3.json"
+
+
+class Reference(Policy):
+    """A trained policy of stable-baselines3 in this project's words."""
+
+    def __init__(self, model: stable_baselines3.PPO) -> None:
+        self.model = model
+
+    def design(self, observation: Singles) -> Singles:
+        """Return the design that has no effect."""
+        return np.zeros((*observation.shape[:-1], 1), dtype=np.float32)
+
+    def act(self, observation: Singles) -> Singles:
+        """Return the mean torque over the largest."""
+        torque: Singles = self.model.predict(observation[..., :3], deterministic=True)[0]
+        return torque / MAX_TORQUE
+
+    def tensors(self) -> Mapping[str, Any]:  # type: ignore[override]  # It is never saved.
+        """Return nothing."""
+        return {}
+
+
+def train_reference(seed: int) -> float:
+    """Train stable-baselines3's PPO; return its mean return over the task's evaluation instances."""
+    torch.set_num_threads(1)
+    environments = make_vec_env(ENVIRONMENT, n_envs=4, seed=seed)
+    model = stable_baselines3.PPO("MlpPolicy", environments, seed=seed, device="cpu", **STABLE_BASELINES3)
+    model.learn(BUDGET)
+    return float(evaluate(Pendulum(), Reference(model)).returns.mean())
+
+
+def measured(measure: Callable[[int], float], seeds: list[int]) -> dict[str, Any]:
+    """Return the mean returns of all seeds, their mean and deviation, and the seconds that a run took."""
+    started = time.monotonic()
+    returns = [round(measure(seed), 2) for seed in seeds]
+    return {
+        "returns": returns,
+        "mean": round(float(np.mean(returns)), 2),
+        "standard_deviation": round(float(np.std(returns, ddof=1)), 2) if len(returns) > 1 else None,
+        "seconds_a_run": round((time.monotonic() - started) / len(seeds), 1),
+    }
+
+
+def main(seeds: list[int]) -> None:
+    """Measure both and write the record."""
+    record = {
+        "how": f"python tests/learning/measure_pendulum.py {' '.join(map(str, seeds))}",
+        "environment": ENVIRONMENT,
+        "env_steps": BUDGET,
+        "evaluation": f"{Pendulum.num_evaluation_instances} fixed start states, acting with the mean",
+        "seeds": seeds,
+        "versions": {
+            "gymnasium": gymnasium.__version__,
+            "stable_baselines3": stable_baselines3.__version__,
+            "torch": torch.__version__,
+        },
+        "settings": {"stable_baselines3": STABLE_BASELINES3, "ours": {key: str(value) for key, value in OURS.items()}},
+        "stable_baselines3": measured(train_reference, seeds),
+        "ours": measured(train, seeds),
+    }
+    RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main([int(argument) for argument in sys.argv[1:]] or [0, 1, 2])

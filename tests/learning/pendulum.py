@@ -1,0 +1,119 @@
+"""Gymnasium's Pendulum-v1 as a task, and the PPO core's settings for it, to compare the core with another's.
+
+The design is one number without effect. The physics are Gymnasium's own, one environment per slot.
+
+Shapes: `b` slots that a call names, `I` = 2 instance (angle, angular velocity), `D` = 1, `C` = 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+
+from codesign_bench.evaluate import evaluate
+from codesign_bench.method import Method, Problem, load_method
+from codesign_bench.seeding import Streams
+from codesign_bench.task import Box, Floats, Simulator, Slots, Task, ToolGraph
+
+ENVIRONMENT = "Pendulum-v1"
+MAX_TORQUE = 2.0
+BUDGET = 100_000
+
+STABLE_BASELINES3: dict[str, Any] = {
+    "n_steps": 1024,
+    "batch_size": 64,
+    "n_epochs": 10,
+    "learning_rate": 1e-3,
+    "gamma": 0.9,
+    "gae_lambda": 0.95,
+    "clip_range": 0.2,
+    "max_grad_norm": 0.5,
+    "ent_coef": 0.0,
+}
+"""stable-baselines3's hyperparameters for 4 environments; its networks have two tanh layers of 64."""
+
+OURS: dict[str, Any] = {
+    "batch_size": 4 * 1024,
+    "minibatch_size": 64,
+    "epochs": 10,
+    "policy_learning_rate": 1e-3,
+    "value_learning_rate": 1e-3,
+    "design_learning_rate": 1e-3,
+    "gamma": 0.9,
+    "gae_lambda": 0.95,
+    "clip_ratio": 0.2,
+    "max_gradient_norm": 0.5,
+    "entropy_weight": 0.0,
+    "kl_threshold": float("inf"),
+    "control_log_std": 0.0,
+    "fix_std": False,
+    "policy_net": (64, 64),
+    "value_net": (64, 64),
+    "final_learning_rate_fraction": 1.0,
+    "bootstrap_time_limit": True,
+}
+"""The same settings in this project's words."""
+
+
+class Pendulum(Task):
+    """Swing a pendulum up and keep it there; 200 steps, which no success ends."""
+
+    name = "pendulum"
+    title = "Pendulum"
+    horizon = 200
+    control_period = 0.05
+    design_space = Box.of(nothing=(-1.0, 1.0, "1"))
+    tool_graph = ToolGraph(num_nodes=1, edges=(), parameter_nodes=(0,))
+    control_space = Box.of(torque=(-MAX_TORQUE, MAX_TORQUE, "N m"))
+    instance_space = Box.of(angle=(-np.pi, np.pi, "rad"), angular_velocity=(-1.0, 1.0, "rad/s"))
+    goal_size = 0
+    state_space = Box.of(cosine=(-1.0, 1.0, "1"), sine=(-1.0, 1.0, "1"), angular_velocity=(-8.0, 8.0, "rad/s"))
+
+    def material(self, designs: Floats) -> Floats:
+        """Nothing is used."""
+        return np.zeros(len(designs))
+
+    def effort(self, controls: Floats) -> Floats:
+        """The torque over the largest."""
+        return np.abs(controls[:, 0])
+
+    def make_simulator(self, num_slots: int) -> Simulator:
+        """Return Gymnasium's pendulums."""
+        return _Pendulums(num_slots)
+
+
+class _Pendulums(Simulator):
+    def __init__(self, num_slots: int) -> None:
+        super().__init__(num_slots, state_size=3)
+        self._environments: list[Any] = [gymnasium.make(ENVIRONMENT).unwrapped for _ in range(num_slots)]
+
+    def begin(self, slots: Slots, instances: Floats) -> None:
+        """Let go of the pendulums at their angles and velocities."""
+        for slot, instance in zip(slots, instances, strict=True):
+            self._environments[slot].reset(seed=0)  # What it draws is replaced by the instance.
+            self._environments[slot].state = instance.copy()
+        self.state[slots] = np.stack([np.cos(instances[:, 0]), np.sin(instances[:, 0]), instances[:, 1]], axis=1)
+
+    def build(self, slots: Slots, designs: Floats) -> None:
+        """Build nothing."""
+
+    def step(self, slots: Slots, controls: Floats) -> None:
+        """Apply the torques."""
+        for slot, control in zip(slots, controls, strict=True):
+            self.state[slot], self.reward[slot], *_ = self._environments[slot].step(MAX_TORQUE * control)
+
+
+def train(seed: int, budget: int = BUDGET) -> float:
+    """Train the PPO core on the pendulum; return its mean return over the task's evaluation instances."""
+    torch.set_num_threads(1)
+    method_class = load_method("shared_arch")
+    task = Pendulum()
+    method: Method[Any] = method_class(Problem(task), replace(method_class.config_class(), **OURS), Streams(seed))
+    done = 0
+    while done < budget:
+        done += method.train(budget - done).env_steps
+    return float(evaluate(task, method.policy()).returns.mean())

@@ -1,0 +1,72 @@
+"""The PPO core learns Gymnasium's pendulum about as well as stable-baselines3's PPO with the same settings.
+
+The reference numbers are recorded in `tests/data/pendulum_stable_baselines3.json`, with how they were measured.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from codesign_bench.episodes import Episodes
+
+HERE = Path(__file__).parent
+RECORD = HERE.parent / "data" / "pendulum_stable_baselines3.json"
+TOLERANCE = 60.0
+"""How far below the reference's mean a run may end; an episode's return is about -1200 untrained, -150 at best, and
+seeds of either differ by tens."""
+
+
+@pytest.fixture
+def pendulum(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The module with the task and the settings."""
+    monkeypatch.syspath_prepend(str(HERE))
+    return importlib.import_module("pendulum")
+
+
+def test_the_task_is_gymnasiums_pendulum(pendulum: Any) -> None:
+    task = pendulum.Pendulum()
+    episodes, slots, reference = Episodes(task, 3), np.arange(3), gymnasium.make(pendulum.ENVIRONMENT)
+    episodes.begin(slots, task.evaluation_instances()[:3])
+    episodes.design(slots, np.zeros((3, 1)))
+    reference.reset(seed=0)
+    inner: Any = reference.unwrapped
+    inner.state = task.evaluation_instances()[1].copy()
+    rng = np.random.default_rng(0)
+    for step in range(task.horizon):
+        controls = rng.uniform(-1.0, 1.0, size=(3, 1))
+        reward, terminated, truncated = episodes.control(slots, controls)
+        seen, expected, *ends = reference.step(pendulum.MAX_TORQUE * controls[1])[:4]
+        np.testing.assert_allclose(episodes.observation[1, task.layout.state], seen, atol=1e-6)
+        assert reward[1] == pytest.approx(float(expected))
+        assert [terminated[1], truncated[1]] == ends == [False, step == task.horizon - 1]
+
+
+def test_both_are_given_the_same_settings(pendulum: Any) -> None:
+    ours, theirs = pendulum.OURS, pendulum.STABLE_BASELINES3
+    assert ours["batch_size"] == 4 * theirs["n_steps"]
+    for name, other in {
+        "minibatch_size": "batch_size",
+        "epochs": "n_epochs",
+        "policy_learning_rate": "learning_rate",
+        "value_learning_rate": "learning_rate",
+        "gamma": "gamma",
+        "gae_lambda": "gae_lambda",
+        "clip_ratio": "clip_range",
+        "max_gradient_norm": "max_grad_norm",
+        "entropy_weight": "ent_coef",
+    }.items():
+        assert ours[name] == theirs[other], name
+
+
+@pytest.mark.slow
+def test_it_learns_like_stable_baselines3(pendulum: Any) -> None:
+    record = json.loads(RECORD.read_text(encoding="utf-8"))
+    assert record["env_steps"] == pendulum.BUDGET
+    assert pendulum.train(seed=5) > record["stable_baselines3"]["mean"] - TOLERANCE

@@ -100,6 +100,8 @@ class Episodes:
 
 
 def _finite(values: Floats, what: str) -> Floats:
-    if not np.isfinite(values).all():
-        raise ValueError(f"the {what} holds values that are not finite: {values}")
+    bad = ~np.isfinite(values)
+    if bad.any():
+        row = int(np.flatnonzero(bad.any(axis=-1))[0])
+        raise ValueError(f"{bad.sum()} values of the {what} are not finite, the first in row {row}: {values[row]}")
     return np.clip(values, -1.0, 1.0).astype(np.float64, copy=False)

@@ -34,7 +34,7 @@ class Config(EvolutionConfig, PerceptronConfig):
     """Hyperparameters of `cma_rl`: CMA-ES's for the design, PPO's and the perceptrons' for the controller."""
 
 
-TUNED: Tuned = {"laptop": {}, "quick": {}}
+TUNED: Tuned = {"laptop": {"sigma0": 0.4}, "quick": {}}
 """What was tuned for this baseline (ours)."""
 
 

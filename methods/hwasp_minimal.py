@@ -29,7 +29,7 @@ class Config(GraphConfig):
     """Hyperparameters of `hwasp_minimal`: PPO's and the graph networks'."""
 
 
-TUNED: Tuned = {"laptop": {}, "quick": {}}
+TUNED: Tuned = {"laptop": {"design_learning_rate": 2e-2, "design_kl_threshold": 0.3}, "quick": {}}
 """What was tuned for this baseline (ours)."""
 
 

@@ -18,15 +18,15 @@ TABLE = PLANAR_SCENES["push"]
 TOOL_START = np.array(TABLE.tool_position_init, dtype=np.float64)
 """Where the held end starts, m (paper, table of push)."""
 START_CLEARANCE = 0.25
-"""A tool that would reach closer to the puck than this starts further right by what is missing, m (ours)."""
+"""A tool that would start closer to the puck than this starts left or right of there, whichever is nearer, m (ours)."""
 FIRST_LINK_ANGLE = np.pi
-"""The first link points left, from the robot's side towards the puck, rad (ours)."""
-WORKSPACE = Box.of(base_x=(17.5, 27.0, "m"), base_y=(0.0, 20.0, "m"))
-"""Where the held end may go: the robot's side of the puck, so that goals need reach or a hook (ours)."""
+"""The first link points left and passes above the puck, rad (ours)."""
+WORKSPACE = Box.of(base_x=(8.0, 28.0, "m"), base_y=(6.0, 18.0, "m"))
+"""Where the held end may go. It stays off the table's lower part, so that goals there need a tool that reaches (ours)."""
 MAX_SPEED = 6.0
 """Largest speed of the held end along each axis, m/s (ours): 0.1 m a physics step, a tenth of the puck's radius."""
 
-PUCK_START = np.array([15.0, 10.0])
+PUCK_START = np.array([16.0, 7.5])
 """m (ours)."""
 PUCK_RADIUS = 1.0
 """m (scale of the first author's early scenes)."""
@@ -37,10 +37,10 @@ PUCK_DECELERATION = 12.0
 CONTACT_FRICTION = 0.3
 """Between link and puck (scale of the early scenes)."""
 
-GOAL_DISTANCE = (3.0, 7.0)
+GOAL_DISTANCE = (3.0, 6.0)
 """Smallest and largest distance of a goal from the puck's start, m (ours)."""
-GOAL_RADIUS = 1.0
-"""The puck's centre must stop within this distance of the goal, m (ours)."""
+GOAL_RADIUS = 1.5
+"""The puck's centre must stop within this distance of the goal, m (goal radius of the early scenes)."""
 REST_SPEED = 0.2
 """A puck slower than this is at rest, m/s (ours)."""
 REST_STEPS = 3
@@ -58,8 +58,10 @@ class Push(Task):
     """Push a round puck with the tool such that it stops at the goal (paper, appendix "Environment Details").
 
     Seen from above. The tool is a chain of three links whose free end the robot holds and moves; it never turns, so
-    what the tool can do to the puck is decided by its shape. Goals lie all around the puck; the held end stays on the
-    right of the puck's start, so goals on the right must be reached by pulling, and goals on the left by reaching over.
+    what the tool can do to the puck is decided by its shape. At the start the chain passes above the puck. Goals lie
+    all around: to push, a link must stand on the puck's far side from the goal, so goals below want a flat or hollow
+    underside, goals on the left a link to the right of the puck, goals on the right a hook on its left, and goals above
+    a hook beneath it. The held end stays off the lower part of the table, so low goals want a tool that reaches.
 
     Action space
         Design, 5: lengths of three links, 1 to 3 m each, and the two angles between them, +-90 degrees (paper, table
@@ -70,10 +72,10 @@ class Push(Task):
         | --- | --- | --- | --- |
         | 0, 1 | puck position x, y | m | -6 .. 30 |
         | 2, 3 | puck velocity x, y | m/s | -20 .. 20 |
-        | 4, 5 | held end's position x, y | m | workspace |
+        | 4, 5 | held end's position x, y | m | 8 .. 28 and 6 .. 18 |
         | 6, 7 | from puck to goal x, y | m | -25 .. 25 |
         | 8, 9 | from held end to puck x, y | m | -25 .. 25 |
-        | 10, 11 | goal position x, y | m | 8 .. 22 and 3 .. 17 |
+        | 10, 11 | goal position x, y | m | 10 .. 22 and 1.5 .. 13.5 |
 
         followed by the design (5, normalised) and the phase (3).
 
@@ -81,18 +83,18 @@ class Push(Task):
         `Push.design_space`; length = 2 m (1 + r), r in [-0.5, 0.5]; angle = 90 degrees r, r in [-1, 1].
 
     Goal space
-        Positions 3 to 7 m from the puck's start, uniform in area, all directions (ours).
+        Positions 3 to 6 m from the puck's start, uniform in area, all directions (ours).
 
     Reward
         (d_before - d_after) / d_start - 0.001 per control step, d the distance from puck to goal in m; +1 on success.
         An episode's return lies below 2.
 
     Starting state
-        Puck at rest at (15, 10), held end at (20, 10) (paper) for every goal. A tool that would then lie on the puck
-        starts further right, 0.25 m clear of it (ours).
+        Puck at rest at (16, 7.5), held end at (20, 10) (paper) for every goal. A tool that would then lie on the puck
+        starts at the nearest place to the left or right of there that is 0.25 m clear of it (ours).
 
     Episode end
-        Success: the puck's centre is within 1 m of the goal and slower than 0.2 m/s for 3 control steps. Time limit:
+        Success: the puck's centre is within 1.5 m of the goal and slower than 0.2 m/s for 3 control steps. Time limit:
         150 control steps of 1/30 s (150 is the paper's).
     """
 
@@ -236,23 +238,40 @@ class _PushSimulator(PlanarSimulator):
 
 
 def start_shift(points: Floats) -> Floats:
-    """Return by how much (b,) tools with chain `points` (b, 4, 2) must start further right to be clear of the puck, m.
+    """Return how far (b,) tools with chain `points` (b, 4, 2) must start from `TOOL_START` along x to be clear, in m.
 
-    A link's core must stay outside the disc around the puck of radius `reach`. Moving right, it leaves the disc at the
-    last of: either of its ends leaving, and its line leaving where the line touches the disc.
+    Along x, a link is too close to the puck over one interval. The tool starts at the place nearest to no shift that
+    lies in no link's interval: at zero or at an end of an interval.
+    """
+    low, high = _blocked_shifts(points)
+    candidates = np.concatenate([np.zeros((len(points), 1)), low, high], axis=1)
+    inside = (candidates[:, :, None] > low[:, None] + 1e-9) & (candidates[:, :, None] < high[:, None] - 1e-9)
+    distance = np.where(inside.any(axis=2) | np.isnan(candidates), np.inf, np.abs(candidates))
+    result: Floats = candidates[np.arange(len(points)), distance.argmin(axis=1)]
+    return result
+
+
+def _blocked_shifts(points: Floats) -> tuple[Floats, Floats]:
+    """Return the ends (b, 3) of each link's interval of shifts at which it is too close to the puck; NaN if none.
+
+    A link's core must keep out of the disc of radius `reach` around the puck. The shifts at which it does not are those
+    at which one of its ends lies in the disc, or its inner part crosses the disc; together they are one interval.
     """
     reach = PUCK_RADIUS + LINK_HALF_WIDTH + START_CLEARANCE
     start, end = points[:, :-1] + TOOL_START - PUCK_START, points[:, 1:] + TOOL_START - PUCK_START
-    leaves = [np.sqrt(np.maximum(reach**2 - at[..., 1] ** 2, 0.0)) - at[..., 0] for at in (start, end)]
-    leaves = [np.where(np.abs(at[..., 1]) < reach, leave, 0.0) for at, leave in zip((start, end), leaves, strict=True)]
-    direction = (end - start) / np.linalg.norm(end - start, axis=-1, keepdims=True)
-    # The line's normal that points right: the link touches the disc last at -reach times it.
-    normal = np.stack([direction[..., 1], -direction[..., 0]], axis=-1)
-    normal *= np.where(normal[..., :1] < 0.0, -1.0, 1.0)
-    touching = reach * normal
-    slope = np.where(np.abs(normal[..., 0]) > 1e-9, normal[..., 0], 1.0)
-    shift = ((touching - start) * normal).sum(-1) / slope
-    along = ((touching - start - shift[..., None] * np.array([1.0, 0.0])) * direction).sum(-1)
-    inside = (along > 0.0) & (along < np.linalg.norm(end - start, axis=-1)) & (np.abs(normal[..., 0]) > 1e-9)
-    result: Floats = np.maximum(0.0, np.max([*leaves, np.where(inside, shift, 0.0)], axis=(0, 2)))
-    return result
+    lows, highs = [], []
+    for at in (start, end):
+        half = np.sqrt(np.where(np.abs(at[..., 1]) < reach, reach**2 - at[..., 1] ** 2, np.nan))
+        lows.append(-at[..., 0] - half)
+        highs.append(-at[..., 0] + half)
+    length = np.linalg.norm(end - start, axis=-1)
+    direction = (end - start) / length[..., None]
+    normal = np.stack([-direction[..., 1], direction[..., 0]], axis=-1)
+    across = np.where(np.abs(normal[..., 0]) > 1e-9, normal[..., 0], np.nan)
+    for side in (-reach, reach):
+        shift = (side - (start * normal).sum(-1)) / across
+        along = -((start * direction).sum(-1) + shift * direction[..., 0])
+        touches = np.where((along > 0.0) & (along < length), shift, np.nan)
+        lows.append(touches)
+        highs.append(touches)
+    return np.fmin.reduce(lows), np.fmax.reduce(highs)

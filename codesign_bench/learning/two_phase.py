@@ -41,11 +41,11 @@ OURS = {"source": "ours"}
 class PPOConfig:
     """Hyperparameters that every PPO-based method has. Their defaults are total: any task runs with them."""
 
-    batch_size: int = 20_000
+    batch_size: int = 10_000
     """Environment steps of a batch; episodes are finished."""
-    minibatch_size: int = 2_000
+    minibatch_size: int = 500
     """Steps of a minibatch."""
-    epochs: int = 5
+    epochs: int = 4
     """Passes over a batch (the paper's "PPO steps per batch")."""
     policy_learning_rate: float = 7e-4
     """Adam's step size for designer and controller."""
@@ -99,13 +99,13 @@ class GraphConfig(PPOConfig):
 
     control_gnn: tuple[int, ...] = (64, 64, 64)
     """Widths of the controller's and the value network's graph convolutions."""
-    control_index_mlp: tuple[int, ...] = (128, 128)
+    control_index_mlp: tuple[int, ...] = (64, 64)
     """Widths of the controller's index MLP."""
     design_gnn: tuple[int, ...] = (64, 64, 64)
     """Widths of the designer's graph convolutions."""
-    design_index_mlp: tuple[int, ...] = (128, 128)
+    design_index_mlp: tuple[int, ...] = (64, 64)
     """Widths of the designer's index MLP."""
-    value_mlp: tuple[int, ...] = (256, 128)
+    value_mlp: tuple[int, ...] = (128,)
     """Widths of the tanh layers behind the value network's graph network."""
 
 
@@ -113,9 +113,9 @@ class GraphConfig(PPOConfig):
 class PerceptronConfig(PPOConfig):
     """Hyperparameters of a PPO-based method with multilayer perceptrons."""
 
-    policy_net: tuple[int, ...] = (256, 256, 256, 256, 256)
+    policy_net: tuple[int, ...] = (208, 208, 208)
     """Widths of the policy's hidden layers."""
-    value_net: tuple[int, ...] = (256, 256, 256, 256, 256)
+    value_net: tuple[int, ...] = (208, 208, 208)
     """Widths of the value network's hidden layers."""
 
 

@@ -22,7 +22,7 @@ START_CLEARANCE = 0.25
 FIRST_LINK_ANGLE = np.pi
 """The first link points left and passes above the puck, rad (ours)."""
 WORKSPACE = Box.of(base_x=(8.0, 28.0, "m"), base_y=(6.0, 18.0, "m"))
-"""Where the held end may go. It stays off the table's lower part, so that goals there need a tool that reaches (ours)."""
+"""Where the held end may go. It stays off the lower part, so that goals there need a tool that reaches (ours)."""
 MAX_SPEED = 6.0
 """Largest speed of the held end along each axis, m/s (ours): 0.1 m a physics step, a tenth of the puck's radius."""
 

@@ -21,8 +21,8 @@ START_CLEARANCE = 0.25
 """A tool that would start closer to the puck than this starts left or right of there, whichever is nearer, m (ours)."""
 FIRST_LINK_ANGLE = np.pi
 """The first link points left and passes above the puck, rad (ours)."""
-WORKSPACE = Box.of(base_x=(8.0, 28.0, "m"), base_y=(6.0, 18.0, "m"))
-"""Where the held end may go. It stays off the lower part, so that goals there need a tool that reaches (ours)."""
+WORKSPACE = Box.of(base_x=(16.0, 24.0, "m"), base_y=(7.5, 15.5, "m"))
+"""Where the held end may go: too small a place to serve far goals on opposite sides well with one tool (ours)."""
 MAX_SPEED = 6.0
 """Largest speed of the held end along each axis, m/s (ours): 0.1 m a physics step, a tenth of the puck's radius."""
 
@@ -61,7 +61,7 @@ class Push(Task):
     what the tool can do to the puck is decided by its shape. At the start the chain passes above the puck. Goals lie
     all around: to push, a link must stand on the puck's far side from the goal, so goals below want a flat or hollow
     underside, goals on the left a link to the right of the puck, goals on the right a hook on its left, and goals above
-    a hook beneath it. The held end stays off the lower part of the table, so low goals want a tool that reaches.
+    a hook beneath it. The held end stays in a square of 8 m around its start, so far goals want a tool that reaches.
 
     Action space
         Design, 5: lengths of three links, 1 to 3 m each, and the two angles between them, +-90 degrees (paper, table
@@ -72,7 +72,7 @@ class Push(Task):
         | --- | --- | --- | --- |
         | 0, 1 | puck position x, y | m | -6 .. 30 |
         | 2, 3 | puck velocity x, y | m/s | -20 .. 20 |
-        | 4, 5 | held end's position x, y | m | 8 .. 28 and 6 .. 18 |
+        | 4, 5 | held end's position x, y | m | 16 .. 24 and 7.5 .. 15.5 |
         | 6, 7 | from puck to goal x, y | m | -25 .. 25 |
         | 8, 9 | from held end to puck x, y | m | -25 .. 25 |
         | 10, 11 | goal position x, y | m | 10 .. 22 and 1.5 .. 13.5 |

@@ -24,8 +24,8 @@ push: Any = load_module("tasks", "push")
 REACH = push.PUCK_RADIUS + push.LINK_HALF_WIDTH
 """Distance of a link's core from the puck's centre when they touch."""
 SLOT = np.array([0])
-STRAIGHT = np.array([[1.0, 1.0, 1.0, 0.0, 0.0]])
-"""The longest straight tool, normalised."""
+STRAIGHT = np.array([[-0.25, -0.25, -0.25, 0.0, 0.0]])
+"""A straight tool, normalised: short enough to go behind the puck, long enough to push it to far goals on the left."""
 IDLE = np.zeros((1, 2))
 SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
 """A title in the docstring and the indented text below it."""
@@ -94,7 +94,7 @@ def stay(observation: Floats) -> Floats:
 def push_left(observation: Floats) -> Floats:
     """Bring the tip of a straight tool to the right of the puck, push left, and stop near the goal."""
     puck, base, to_goal = observation[0:2], observation[4:6], observation[6:8]
-    length = sum(load_task("push").design_space.high[:3])
+    length = load_task("push").design_space.from_unit(STRAIGHT)[0, :3].sum()
     behind = puck + np.array([REACH + length + 0.2, 0.0])
     aligned = abs(base[1] - puck[1]) < 0.05
     if not aligned:  # First to the right, where the tool is clear of the puck, then to the puck's height.

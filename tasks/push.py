@@ -26,7 +26,7 @@ WORKSPACE = Box.of(base_x=(16.0, 24.0, "m"), base_y=(7.5, 15.5, "m"))
 MAX_SPEED = 6.0
 """Largest speed of the held end along each axis, m/s (ours): 0.1 m a physics step, a tenth of the puck's radius."""
 
-PUCK_START = np.array([16.0, 7.5])
+PUCK_START = np.array([16.0, 8.0])
 """m (ours)."""
 PUCK_RADIUS = 1.0
 """m (scale of the first author's early scenes)."""
@@ -75,7 +75,7 @@ class Push(Task):
         | 4, 5 | held end's position x, y | m | 16 .. 24 and 7.5 .. 15.5 |
         | 6, 7 | from puck to goal x, y | m | -25 .. 25 |
         | 8, 9 | from held end to puck x, y | m | -25 .. 25 |
-        | 10, 11 | goal position x, y | m | 10 .. 22 and 1.5 .. 13.5 |
+        | 10, 11 | goal position x, y | m | 10 .. 22 and 2 .. 14 |
 
         followed by the design (5, normalised) and the phase (3).
 
@@ -90,7 +90,7 @@ class Push(Task):
         An episode's return lies below 2.
 
     Starting state
-        Puck at rest at (16, 7.5), held end at (20, 10) (paper) for every goal. A tool that would then lie on the puck
+        Puck at rest at (16, 8), held end at (20, 10) (paper) for every goal. A tool that would then lie on the puck
         starts at the nearest place to the left or right of there that is 0.25 m clear of it (ours).
 
     Episode end

@@ -1,6 +1,7 @@
 """Gymnasium's Pendulum-v1 as a task, and the PPO core's settings for it, to compare the core with another's.
 
-The design is one number without effect. The physics are Gymnasium's own, one environment per slot.
+The design is one number without effect, which is given, so that PPO learns control alone. The physics are Gymnasium's
+own, one environment per slot.
 
 Shapes: `b` slots that a call names, `I` = 2 instance (angle, angular velocity), `D` = 1, `C` = 1.
 """
@@ -15,7 +16,8 @@ import numpy as np
 import torch
 
 from codesign_bench.evaluate import evaluate
-from codesign_bench.method import Method, Problem, load_method
+from codesign_bench.learning.two_phase import TwoPhaseLearner
+from codesign_bench.method import Problem, load_method
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Box, Floats, Simulator, Slots, Task, ToolGraph
 
@@ -42,7 +44,6 @@ OURS: dict[str, Any] = {
     "epochs": 10,
     "policy_learning_rate": 1e-3,
     "value_learning_rate": 1e-3,
-    "design_learning_rate": 1e-3,
     "gamma": 0.9,
     "gae_lambda": 0.95,
     "clip_ratio": 0.2,
@@ -107,13 +108,22 @@ class _Pendulums(Simulator):
             self.state[slot], self.reward[slot], *_ = self._environments[slot].step(MAX_TORQUE * control)
 
 
+def make_learner(seed: int) -> TwoPhaseLearner:
+    """Return the PPO core with the perceptrons of `shared_arch` and a given design, so that it learns control alone."""
+    method_class: Any = load_method("shared_arch")
+    problem, streams = Problem(Pendulum()), Streams(seed)
+    config = replace(method_class.config_class(), **OURS)
+    actor = method_class.make_actor(problem.task, config, streams["policy weights"])
+    value = method_class.make_value(problem.task, config, streams["value weights"])
+    return TwoPhaseLearner(
+        problem, config, streams, actor, value, lambda slots, _: np.zeros((len(slots), 1), np.float32)
+    )
+
+
 def train(seed: int, budget: int = BUDGET) -> float:
     """Train the PPO core on the pendulum; return its mean return over the task's evaluation instances."""
     torch.set_num_threads(1)
-    method_class = load_method("shared_arch")
-    task = Pendulum()
-    method: Method[Any] = method_class(Problem(task), replace(method_class.config_class(), **OURS), Streams(seed))
-    done = 0
-    while done < budget:
-        done += method.train(budget - done).env_steps
-    return float(evaluate(task, method.policy()).returns.mean())
+    learner = make_learner(seed)
+    while learner.env_steps < budget:
+        learner.train(budget - learner.env_steps)
+    return float(evaluate(learner.problem.task, learner.policy()).returns.mean())

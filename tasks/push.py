@@ -21,12 +21,12 @@ START_CLEARANCE = 0.25
 """A tool that would start closer to the puck than this starts left or right of there, whichever is nearer, m (ours)."""
 FIRST_LINK_ANGLE = np.pi
 """The first link points left and passes above the puck, rad (ours)."""
-WORKSPACE = Box.of(base_x=(16.0, 24.0, "m"), base_y=(7.5, 15.5, "m"))
-"""Where the held end may go: too small a place to serve far goals on opposite sides well with one tool (ours)."""
+WORKSPACE = Box.of(base_x=(14.0, 24.0, "m"), base_y=(6.5, 10.5, "m"))
+"""Where the held end may go: too low a place to lift a deep hook over the puck and use it on the other side (ours)."""
 MAX_SPEED = 6.0
 """Largest speed of the held end along each axis, m/s (ours): 0.1 m a physics step, a tenth of the puck's radius."""
 
-PUCK_START = np.array([16.0, 8.0])
+PUCK_START = np.array([16.0, 8.25])
 """m (ours)."""
 PUCK_RADIUS = 1.0
 """m (scale of the first author's early scenes)."""
@@ -37,7 +37,7 @@ PUCK_DECELERATION = 12.0
 CONTACT_FRICTION = 0.3
 """Between link and puck (scale of the early scenes)."""
 
-GOAL_DISTANCE = (3.0, 6.0)
+GOAL_DISTANCE = (3.0, 5.0)
 """Smallest and largest distance of a goal from the puck's start, m (ours)."""
 GOAL_RADIUS = 1.5
 """The puck's centre must stop within this distance of the goal, m (goal radius of the early scenes)."""
@@ -61,7 +61,8 @@ class Push(Task):
     what the tool can do to the puck is decided by its shape. At the start the chain passes above the puck. Goals lie
     all around: to push, a link must stand on the puck's far side from the goal, so goals below want a flat or hollow
     underside, goals on the left a link to the right of the puck, goals on the right a hook on its left, and goals above
-    a hook beneath it. The held end stays in a square of 8 m around its start, so far goals want a tool that reaches.
+    a hook beneath it. The held end stays in a box of 10 m x 4 m, too low to lift a deep hook over the puck: a tool that
+    serves one side hardly serves the other.
 
     Action space
         Design, 5: lengths of three links, 1 to 3 m each, and the two angles between them, +-90 degrees (paper, table
@@ -72,10 +73,10 @@ class Push(Task):
         | --- | --- | --- | --- |
         | 0, 1 | puck position x, y | m | -6 .. 30 |
         | 2, 3 | puck velocity x, y | m/s | -20 .. 20 |
-        | 4, 5 | held end's position x, y | m | 16 .. 24 and 7.5 .. 15.5 |
+        | 4, 5 | held end's position x, y | m | 14 .. 24 and 6.5 .. 10.5 |
         | 6, 7 | from puck to goal x, y | m | -25 .. 25 |
         | 8, 9 | from held end to puck x, y | m | -25 .. 25 |
-        | 10, 11 | goal position x, y | m | 10 .. 22 and 2 .. 14 |
+        | 10, 11 | goal position x, y | m | 11 .. 21 and 3.25 .. 13.25 |
 
         followed by the design (5, normalised) and the phase (3).
 
@@ -83,14 +84,14 @@ class Push(Task):
         `Push.design_space`; length = 2 m (1 + r), r in [-0.5, 0.5]; angle = 90 degrees r, r in [-1, 1].
 
     Goal space
-        Positions 3 to 6 m from the puck's start, uniform in area, all directions (ours).
+        Positions 3 to 5 m from the puck's start, uniform in area, all directions (ours).
 
     Reward
         (d_before - d_after) / d_start - 0.001 per control step, d the distance from puck to goal in m; +1 on success.
         An episode's return lies below 2.
 
     Starting state
-        Puck at rest at (16, 8), held end at (20, 10) (paper) for every goal. A tool that would then lie on the puck
+        Puck at rest at (16, 8.25), held end at (20, 10) (paper) for every goal. A tool that would then lie on the puck
         starts at the nearest place to the left or right of there that is 0.25 m clear of it (ours).
 
     Episode end

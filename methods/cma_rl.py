@@ -20,8 +20,9 @@ from codesign_bench.learning.evolution import Evolution, EvolutionConfig, paper_
 from codesign_bench.learning.gae import episode_returns
 from codesign_bench.learning.networks import MLP, RunningNorm, torch_generator
 from codesign_bench.learning.observations import Features
+from codesign_bench.learning.ppo_config import PerceptronConfig
 from codesign_bench.learning.profiles import Tuned, paper_perceptrons, ppo_profile, tuned
-from codesign_bench.learning.two_phase import PerceptronConfig, TwoPhaseLearner
+from codesign_bench.learning.two_phase import TwoPhaseLearner
 from codesign_bench.learning.values import MLPValue
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.paper_tables import CMA_RL

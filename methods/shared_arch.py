@@ -16,9 +16,9 @@ from torch import Tensor, nn
 from codesign_bench.learning.actor import Actor
 from codesign_bench.learning.networks import MLP, RunningNorm, torch_generator
 from codesign_bench.learning.observations import Features
+from codesign_bench.learning.ppo_config import PerceptronConfig
 from codesign_bench.learning.ppo_method import PPOMethod
 from codesign_bench.learning.profiles import Tuned, paper_perceptrons, ppo_profile, tuned
-from codesign_bench.learning.two_phase import PerceptronConfig
 from codesign_bench.learning.values import MLPValue, ValueNetwork
 from codesign_bench.paper_tables import SHARED_ARCH
 from codesign_bench.task import Task

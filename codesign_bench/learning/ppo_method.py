@@ -9,7 +9,8 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from codesign_bench.learning.actor import Actor, ActorPolicy, load_module_arrays
-from codesign_bench.learning.two_phase import PPOConfig, TwoPhaseLearner
+from codesign_bench.learning.ppo_config import PPOConfig
+from codesign_bench.learning.two_phase import TwoPhaseLearner
 from codesign_bench.learning.values import ValueNetwork
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams

@@ -10,7 +10,6 @@ updates and its own KL stop.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -27,96 +26,12 @@ from codesign_bench.learning.ppo import (
     minibatches,
     normalized,
 )
+from codesign_bench.learning.ppo_config import PPOConfig
 from codesign_bench.learning.rollout import ChooseDesigns, Collector, Trajectories, slots_for
 from codesign_bench.learning.values import DesignValue, ValueNetwork
 from codesign_bench.method import BatchReport, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Floats, Singles, Slots
-
-TRANSFORM2ACT = {"source": "Transform2Act's default; the paper is silent"}
-OURS = {"source": "ours"}
-
-
-@dataclass(frozen=True, kw_only=True)
-class PPOConfig:
-    """Hyperparameters that every PPO-based method has. Their defaults are total: any task runs with them."""
-
-    batch_size: int = 10_000
-    """Environment steps of a batch; episodes are finished."""
-    minibatch_size: int = 500
-    """Steps of a minibatch."""
-    epochs: int = 4
-    """Passes over a batch (the paper's "PPO steps per batch")."""
-    policy_learning_rate: float = 7e-4
-    """Adam's step size for designer and controller."""
-    value_learning_rate: float = 7e-4
-    """Adam's step size for the value networks."""
-    final_learning_rate_fraction: float = field(default=1.0, metadata=OURS)
-    """Step sizes fall linearly to this fraction of their start over the budget."""
-    entropy_weight: float = 0.0
-    """Weight of the entropy bonus; without effect on fixed standard deviations."""
-    kl_threshold: float = 0.05
-    """A batch's policy update ends at this estimated KL divergence."""
-    control_log_std: float = -0.5
-    """(Initial) log standard deviation of controls in [-1, 1]."""
-    design_log_std: float = -1.0
-    """(Initial) log standard deviation of designs in [-1, 1]."""
-    fix_std: bool = True
-    """Whether the standard deviations stay as they are."""
-    gamma: float = field(default=0.995, metadata=TRANSFORM2ACT)
-    """Discount of a step."""
-    gae_lambda: float = field(default=0.95, metadata=TRANSFORM2ACT)
-    """Weight of longer advantage estimates."""
-    clip_ratio: float = field(default=0.2, metadata=TRANSFORM2ACT)
-    """Clipping range of the probability ratio."""
-    max_gradient_norm: float = field(default=40.0, metadata=TRANSFORM2ACT)
-    """Gradients are clipped to this norm."""
-    bootstrap_time_limit: bool = field(default=True, metadata=OURS)
-    """Whether the time limit is bootstrapped by the value of the state reached; False treats it as an end in itself."""
-    normalize_returns: bool = field(default=True, metadata=OURS)
-    """Whether the value network learns returns normalised by their running mean and deviation."""
-    design_credit: str = "separate"
-    """`joint` (the paper's) or `separate` (ours)."""
-    design_learning_rate: float = 7e-4
-    """Adam's step size for the designer under separate credit."""
-    design_epochs: int = field(default=10, metadata=OURS)
-    """Passes over a batch's design steps under separate credit."""
-    design_minibatch_size: int = field(default=1_000, metadata=OURS)
-    """Design steps of a minibatch under separate credit."""
-    design_kl_threshold: float = field(default=0.05, metadata=OURS)
-    """The design update's own KL stop under separate credit."""
-    num_slots: int | None = field(default=None, metadata=OURS)
-    """Episodes rolled out at once; None: as many as fill a batch with one full-length episode each."""
-
-    def __post_init__(self) -> None:
-        if self.design_credit not in ("joint", "separate"):
-            raise ValueError(f"design_credit is 'joint' or 'separate', not '{self.design_credit}'")
-
-
-@dataclass(frozen=True, kw_only=True)
-class GraphConfig(PPOConfig):
-    """Hyperparameters of a PPO-based method with graph networks."""
-
-    control_gnn: tuple[int, ...] = (64, 64, 64)
-    """Widths of the controller's and the value network's graph convolutions."""
-    control_index_mlp: tuple[int, ...] = (64, 64)
-    """Widths of the controller's index MLP."""
-    design_gnn: tuple[int, ...] = (64, 64, 64)
-    """Widths of the designer's graph convolutions."""
-    design_index_mlp: tuple[int, ...] = (64, 64)
-    """Widths of the designer's index MLP."""
-    value_mlp: tuple[int, ...] = (128,)
-    """Widths of the tanh layers behind the value network's graph network."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class PerceptronConfig(PPOConfig):
-    """Hyperparameters of a PPO-based method with multilayer perceptrons."""
-
-    policy_net: tuple[int, ...] = (208, 208, 208)
-    """Widths of the policy's hidden layers."""
-    value_net: tuple[int, ...] = (208, 208, 208)
-    """Widths of the value network's hidden layers."""
 
 
 class TwoPhaseLearner:

@@ -14,8 +14,9 @@ import torch
 
 from codesign_bench.learning import two_phase
 from codesign_bench.learning.ppo import PolicyUpdate, ValueUpdate
+from codesign_bench.learning.ppo_config import PPOConfig
 from codesign_bench.learning.rollout import Trajectories
-from codesign_bench.learning.two_phase import PPOConfig, TwoPhaseLearner
+from codesign_bench.learning.two_phase import TwoPhaseLearner
 from codesign_bench.task import Floats, Task
 
 MakeLearner = Callable[..., TwoPhaseLearner]

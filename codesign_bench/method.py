@@ -113,8 +113,8 @@ class Method(ABC, Generic[ConfigType]):
         """Collect one batch and learn from it.
 
         Args:
-            remaining_steps: environment steps left in the budget; the batch is the smallest number of whole episodes
-                that is not below min(batch size, remaining steps).
+            remaining_steps: environment steps left in the budget; the batch is about min(batch size, remaining steps)
+                long, in whole episodes.
         """
 
     @abstractmethod

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 import numpy as np
 
 from codesign_bench.learning.evolution import Evolution, EvolutionConfig, paper_evolution
 from codesign_bench.learning.profiles import Tuned, tuned
+from codesign_bench.learning.ranges import check_range
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Floats, Singles, Task
@@ -27,6 +29,10 @@ class Config(EvolutionConfig):
 
     episodes_per_candidate: int = field(default=4, metadata={"source": "ours; the paper is silent"})
     """Instances on which a candidate's return is averaged; a generation's candidates share them."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_range(self, 1, inf, "episodes_per_candidate")
 
 
 TUNED: Tuned = {"laptop": {"sigma0": 0.3, "episodes_per_candidate": 16}, "quick": {}}

@@ -34,6 +34,10 @@ from codesign_bench.task import Singles, Slots, Task
 class Config(EvolutionConfig, PerceptronConfig):
     """Hyperparameters of `cma_rl`: CMA-ES's for the design, PPO's and the perceptrons' for the controller."""
 
+    def __post_init__(self) -> None:
+        EvolutionConfig.__post_init__(self)
+        PerceptronConfig.__post_init__(self)
+
 
 TUNED: Tuned = {"laptop": {"sigma0": 0.4}, "quick": {}}
 """What was tuned for this baseline (ours)."""

@@ -9,12 +9,14 @@ is the fitness history: going on means asking and telling the same generations a
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 import cma
 import numpy as np
 
 from codesign_bench.learning.profiles import sourced
+from codesign_bench.learning.ranges import check_range
 from codesign_bench.paper_tables import CMA_ES_SWEEP
 from codesign_bench.task import Floats
 
@@ -37,6 +39,12 @@ class EvolutionConfig:
     """Multiplier of the rank-mu update (pycma's `CMA_rankmu`)."""
     rank_one_learning_rate: float = field(default=1.0, metadata=PYCMA)
     """Multiplier of the rank-one update (pycma's `CMA_rankone`)."""
+
+    def __post_init__(self) -> None:
+        check_range(self, 2, inf, "popsize")  # pycma's own limit
+        check_range(self, 1e-12, inf, "sigma0")
+        check_range(self, 0, 1, "center_learning_rate", "covariance_learning_rate")
+        check_range(self, 0, 1, "rank_mu_learning_rate", "rank_one_learning_rate")
 
 
 def paper_evolution() -> dict[str, tuple[Any, str]]:

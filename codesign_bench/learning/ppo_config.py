@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import inf
+
+from codesign_bench.learning.ranges import check_range
 
 TRANSFORM2ACT = {"source": "Transform2Act's default; the paper is silent"}
 OURS = {"source": "ours"}
@@ -62,6 +65,11 @@ class PPOConfig:
     def __post_init__(self) -> None:
         if self.design_credit not in ("joint", "separate"):
             raise ValueError(f"design_credit is 'joint' or 'separate', not '{self.design_credit}'")
+        check_range(self, 1, inf, "batch_size", "minibatch_size", "epochs", "num_slots")
+        check_range(self, 1, inf, "design_epochs", "design_minibatch_size")
+        check_range(self, 0, inf, "policy_learning_rate", "value_learning_rate", "design_learning_rate")
+        check_range(self, 0, inf, "entropy_weight", "kl_threshold", "design_kl_threshold", "max_gradient_norm")
+        check_range(self, 0, 1, "gamma", "gae_lambda", "clip_ratio", "final_learning_rate_fraction")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +87,10 @@ class GraphConfig(PPOConfig):
     value_mlp: tuple[int, ...] = (128,)
     """Widths of the tanh layers behind the value network's graph network."""
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_range(self, 1, inf, "control_gnn", "control_index_mlp", "design_gnn", "design_index_mlp", "value_mlp")
+
 
 @dataclass(frozen=True, kw_only=True)
 class PerceptronConfig(PPOConfig):
@@ -88,3 +100,7 @@ class PerceptronConfig(PPOConfig):
     """Widths of the policy's hidden layers."""
     value_net: tuple[int, ...] = (208, 208, 208)
     """Widths of the value network's hidden layers."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_range(self, 1, inf, "policy_net", "value_net")

@@ -1,0 +1,19 @@
+"""Range checks of hyperparameters; a value out of range is told before anything runs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def check_range(config: Any, low: float, high: float, *names: str) -> None:
+    """Check that the fields `names` of a configuration, numbers or tuples of them, lie in [low, high].
+
+    Raises:
+        ValueError: naming the first that does not.
+    """
+    for name in names:
+        value = getattr(config, name)
+        for number in value if isinstance(value, tuple) else (value,):
+            if number is not None and not low <= number <= high:
+                limit = f"at least {low:g}" if high == float("inf") else f"from {low:g} to {high:g}"
+                raise ValueError(f"{name} must be {limit}, not {value}")

@@ -1,0 +1,37 @@
+"""Hyperparameters out of range are refused when a configuration is made, naming the culprit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from codesign_bench.learning.evolution import EvolutionConfig
+from codesign_bench.learning.ppo_config import GraphConfig, PerceptronConfig, PPOConfig
+
+
+@pytest.mark.parametrize(
+    ("config", "change"),
+    [
+        (PPOConfig(), {"minibatch_size": 0}),
+        (PPOConfig(), {"epochs": -1}),
+        (PPOConfig(), {"gamma": 1.5}),
+        (PPOConfig(), {"num_slots": 0}),
+        (PPOConfig(), {"policy_learning_rate": -1e-3}),
+        (PPOConfig(), {"gae_lambda": float("nan")}),
+        (GraphConfig(), {"control_gnn": (64, 0)}),
+        (PerceptronConfig(), {"policy_net": (0,)}),
+        (EvolutionConfig(), {"popsize": 1}),
+        (EvolutionConfig(), {"sigma0": 0.0}),
+    ],
+)
+def test_a_value_out_of_range_is_named(config: Any, change: dict[str, Any]) -> None:
+    (name,) = change
+    with pytest.raises(ValueError, match=name):
+        replace(config, **change)
+
+
+def test_values_at_the_limits_are_allowed() -> None:
+    assert PPOConfig(gamma=1.0, epochs=1, num_slots=None).gamma == 1.0
+    assert EvolutionConfig(popsize=2).popsize == 2

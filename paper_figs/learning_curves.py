@@ -32,7 +32,7 @@ INTERVAL = (
 PANELS_PER_ROW = 3
 PANEL_HEIGHT = 1.5
 """Height of a panel, in inches."""
-SLIVER = 0.02
+SLIVER = 0.05
 """Largest part of a curve's length that counts as too short to see."""
 NEEDED = ("env_steps", "task", "method", "variant", "seed", *QUANTITIES)
 

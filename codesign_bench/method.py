@@ -31,8 +31,6 @@ class Problem:
     cutout: float = 0.0
     """Fraction of the training region whose instances are never trained on."""
     tradeoff: Tradeoff | None = None
-    instance: tuple[float, ...] | None = None
-    """The one instance to train on (fine-tuning), or None for all of them."""
 
     def make_episodes(self, num_slots: int) -> Episodes:
         """Return a batch of `num_slots` episodes of the task."""
@@ -40,8 +38,6 @@ class Problem:
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
         """Return (count, I) training instances: none from the cutout region."""
-        if self.instance is not None:
-            return np.tile(np.array(self.instance, dtype=np.float64), (count, 1))
         instances = self.task.sample_instances(rng, count)
         if self.cutout > 0.0:
             excluded = self.task.in_cutout(instances, self.cutout)
@@ -133,14 +129,6 @@ class Method(ABC, Generic[ConfigType]):
     @abstractmethod
     def load_state(self, state: State) -> None:
         """Go on from `state`; called on a freshly built method with the same problem, config and seed."""
-
-    def warm_start(self, tensors: Mapping[str, Array]) -> None:
-        """Start from a trained policy's tensors (fine-tuning).
-
-        Raises:
-            NotImplementedError: the method cannot.
-        """
-        raise NotImplementedError(f"{self.name} cannot start from a trained policy")
 
 
 def method_names() -> tuple[str, ...]:

@@ -62,7 +62,3 @@ class PPOMethod(Method[ConfigType]):
     def load_state(self, state: State) -> None:
         """Put the learner's state back."""
         self.learner.load_state(state)
-
-    def warm_start(self, tensors: Mapping[str, Any]) -> None:
-        """Start from a trained actor; the value network starts afresh."""
-        load_module_arrays(self.learner.actor, tensors)

@@ -13,6 +13,8 @@ from codesign_bench.evaluate import evaluate
 REFERENCE = Path(__file__).resolve().parent.parent / "results" / "reference"
 METHODS: tuple[str, ...] = import_module("codesign_bench.methods").ORDER
 
+pytestmark = pytest.mark.skipif(not REFERENCE.exists(), reason="a source distribution leaves the results out")
+
 
 def test_every_method_has_six_finished_seeds_on_push() -> None:
     frame = cb.load_results(REFERENCE)

@@ -9,6 +9,7 @@ import pytest
 from codesign_bench.config import check_overrides, differences, method_config, parse_value, resolve
 from codesign_bench.errors import UserError
 from codesign_bench.method import Method, load_method
+from codesign_bench.profiles import PROFILES
 
 pytestmark = pytest.mark.usefixtures("toy")
 
@@ -108,7 +109,8 @@ def test_an_unknown_profile_lists_the_profiles(search: type[Method[Any]]) -> Non
 def test_a_stored_configuration_is_rebuilt_and_compared_by_value(search: type[Method[Any]]) -> None:
     config = resolve(search, "toy_reach", "quick", ["widths=1,2"])
     assert method_config(search.config_class, config.as_json()["method"]) == config.method
-    same = resolve(search, "toy_reach", "laptop", ["widths=1,2", "steps=150000", "evaluations=10"])
+    quick = [f"{name}={value}" for name, (value, _) in PROFILES["quick"].items()]
+    same = resolve(search, "toy_reach", "laptop", ["widths=1,2", *quick])
     assert differences(config.as_json(), same.as_json()) == []
     other = resolve(search, "toy_reach", "quick", ["widths=1,3"])
     assert differences(config.as_json(), other.as_json()) == ["widths: there [1, 2], asked [1, 3]"]

@@ -121,7 +121,7 @@ def test_wall_time_goes_on_from_the_interruption(tmp_path: Path) -> None:
 
 def test_ctrl_c_says_how_to_go_on_and_leaves_no_process(tmp_path: Path) -> None:
     process = start(*ARGUMENTS, "delay=0.2", "--seeds", "2", "--out", tmp_path)
-    wait_for(lambda: len(list(tmp_path.glob(f"*/*/*/*/{CHECKPOINT_FILE}"))) == 1 or process.poll() is not None)
+    wait_for(lambda: len(list(tmp_path.glob(f"*/*/*/*/{CHECKPOINT_FILE}"))) >= 1 or process.poll() is not None)
     process.send_signal(signal.SIGINT)
     code, text = finish(process)
     assert code == 130
@@ -135,8 +135,8 @@ def test_a_killed_worker_does_not_end_the_sweep(tmp_path: Path) -> None:
     if len(os.sched_getaffinity(0)) < 2:
         pytest.skip("one core means no joblib workers")
     process = start(*ARGUMENTS, "delay=0.05", "--seeds", "2", "--out", tmp_path)
-    wait_for(lambda: len(list(tmp_path.glob(f"*/*/*/*/{CHECKPOINT_FILE}"))) == 2 or process.poll() is not None)
-    content = read_cell(cell_folders(tmp_path)[0])
+    wait_for(lambda: len(list(tmp_path.glob(f"*/*/*/*/{CHECKPOINT_FILE}"))) >= 1 or process.poll() is not None)
+    content = read_cell(next(tmp_path.glob(f"*/*/*/*/{CHECKPOINT_FILE}")).parent)
     assert content is not None
     os.kill(parent_of(content["pid"]), signal.SIGKILL)
     code, text = finish(process)

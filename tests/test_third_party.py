@@ -15,7 +15,7 @@ import pytest
 
 EXAMPLE = Path(__file__).parent / "third_party"
 IMPORTS = ("--import", "reach_example.reach", "--import", "reach_example.random_search")
-SIZE = ("--seeds", "1", "--steps", "20000", "--set", "evaluations=3", "--jobs", "1")
+SIZE = ("--seeds", "1", "--steps", "100000", "--set", "evaluations=3", "--jobs", "1")
 TRAIN = ("run", "--task", "reach", "--method", "random_search", *SIZE)
 CELL = Path("reach/random_search/default/seed-00")
 
@@ -80,7 +80,7 @@ def test_it_is_listed(imports: tuple[str, ...], installed: Path) -> None:
 
 def test_it_trains(results: Path) -> None:
     assert cell_status(results) == "done"
-    assert curve(results)["env_steps"].iloc[-1] >= 20_000
+    assert curve(results)["env_steps"].iloc[-1] >= 100_000
     assert curve(results)["return_mean"].iloc[-1] > curve(results)["return_mean"].iloc[0]
 
 
@@ -101,7 +101,6 @@ def test_a_killed_cell_goes_on_where_it_stood(results: Path, installed: Path, tm
     deadline = time.monotonic() + 120
     while not (tmp_path / CELL / "checkpoint.safetensors").exists() and time.monotonic() < deadline:
         time.sleep(0.01)
-    time.sleep(0.3)
     started.kill()
     started.communicate(timeout=60)
     assert cell_status(tmp_path) == "running", "it was not killed in time: the test shows nothing"

@@ -35,9 +35,16 @@ def wait_for(condition: object, seconds: float = PATIENCE_SECONDS) -> None:
 
 
 def start(*arguments: str | Path) -> subprocess.Popen[str]:
-    """Start `codesign-bench` as a process of its own."""
+    """Start `codesign-bench` as a process of its own, which hears Ctrl-C even where the tests run in the background."""
     words = [sys.executable, "-m", "codesign_bench", *map(str, arguments)]
-    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=hear_interrupts
+    )
+
+
+def hear_interrupts() -> None:
+    """Undo what a shell does to the processes that it starts in the background: it has them ignore Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def parent_of(pid: int) -> int:

@@ -75,20 +75,25 @@ class PolicyUpdate:
 
 
 class ValueUpdate:
-    """One batch's regression of a value network on its targets by mean squared error."""
+    """One batch's regression of a value network, `predict`, on its targets by mean squared error."""
 
     def __init__(
-        self, network: nn.Module, optimizer: torch.optim.Optimizer, observation: Tensor, target: Tensor, max_norm: float
+        self,
+        predict: Callable[[Tensor], Tensor],
+        optimizer: torch.optim.Optimizer,
+        observation: Tensor,
+        target: Tensor,
+        max_norm: float,
     ) -> None:
-        self.network, self.optimizer, self.observation, self.target = network, optimizer, observation, target
-        self.parameters = list(network.parameters())
+        self.predict, self.optimizer, self.observation, self.target = predict, optimizer, observation, target
+        self.parameters = [p for group in optimizer.param_groups for p in group["params"]]
         self.max_norm = max_norm
         self.loss = 0.0
 
     def step(self, rows: Slots) -> None:
         """Take one gradient step on `rows` (m,)."""
         index = torch.from_numpy(rows)
-        loss = nn.functional.mse_loss(self.network(self.observation[index]), self.target[index])
+        loss = nn.functional.mse_loss(self.predict(self.observation[index]), self.target[index])
         gradient_step(loss, self.optimizer, self.parameters, self.max_norm)
         self.loss = float(loss.detach())
 

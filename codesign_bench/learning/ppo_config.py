@@ -59,12 +59,16 @@ class PPOConfig:
     """Design steps of a minibatch under separate credit."""
     design_kl_threshold: float = field(default=0.05, metadata=OURS)
     """The design update's own KL stop under separate credit."""
+    precision: str = field(default="fp32", metadata=OURS)
+    """`fp32`, or `bf16` for the products of an update: several times as fast on processors that compute in bfloat16."""
     num_slots: int | None = field(default=None, metadata=OURS)
     """Episodes rolled out at once; None: as many as fill a batch with one full-length episode each."""
 
     def __post_init__(self) -> None:
         if self.design_credit not in ("joint", "separate"):
             raise ValueError(f"design_credit is 'joint' or 'separate', not '{self.design_credit}'")
+        if self.precision not in ("fp32", "bf16"):
+            raise ValueError(f"precision is 'fp32' or 'bf16', not '{self.precision}'")
         check_range(self, 1, inf, "batch_size", "minibatch_size", "epochs", "num_slots")
         check_range(self, 1, inf, "design_epochs", "design_minibatch_size")
         check_range(self, 0, inf, "policy_learning_rate", "value_learning_rate", "design_learning_rate")

@@ -10,6 +10,7 @@ updates and its own KL stop.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,9 @@ from codesign_bench.learning.values import DesignValue, ValueNetwork
 from codesign_bench.method import BatchReport, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Floats, Singles, Slots
+
+Distribution = Callable[[Tensor], tuple[Tensor, Tensor]]
+"""Maps observations (m, O) to mean (m, A) and log standard deviation (A,) of actions."""
 
 
 class TwoPhaseLearner:
@@ -83,6 +87,22 @@ class TwoPhaseLearner:
         self.env_steps += batch.env_steps
         metrics = batch.summary(self.collector.success_count) | self.update(batch)
         return BatchReport(batch.env_steps, metrics), batch
+
+    def _autocast(self) -> torch.autocast:
+        """Return the context in which an update's networks run: products in the configured precision."""
+        return torch.autocast("cpu", torch.bfloat16, enabled=self.config.precision == "bf16")
+
+    def _distribution(self, phase: Distribution, observation: Tensor) -> tuple[Tensor, Tensor]:
+        """Return mean (m, A) and log standard deviation (A,) of a phase's actions as the update computes them."""
+        with self._autocast():
+            mean, log_std = phase(observation)
+        return mean.float(), log_std
+
+    def _predict(self, observation: Tensor) -> Tensor:
+        """Return the value network's output (m,) as the update computes it."""
+        with self._autocast():
+            values: Tensor = self.value(observation)
+        return values.float()
 
     def update(self, batch: Trajectories) -> dict[str, float]:
         """Improve actor and value networks on a batch; return the logged values."""
@@ -140,10 +160,14 @@ class TwoPhaseLearner:
         normal[learned] = normalized(advantage[learned])
         old_log_prob = torch.from_numpy(batch.log_prob[batch.valid])
         log_probs = self._log_probs(batch, observation, is_design)
+        if config.precision != "fp32":  # Ratios start at one only if both of their parts are rounded alike.
+            with torch.no_grad():
+                for part in np.array_split(rows, max(1, len(rows) // config.minibatch_size)):
+                    old_log_prob[part] = log_probs(part)[0]
         policy = PolicyUpdate(
             self._loss(config.kl_threshold), log_probs, self.optimizers["policy"], old_log_prob, normal
         )
-        value = ValueUpdate(self.value, self.optimizers["value"], observation, target, config.max_gradient_norm)
+        value = ValueUpdate(self._predict, self.optimizers["value"], observation, target, config.max_gradient_norm)
         for _ in range(config.epochs):
             for part in minibatches(len(rows), config.minibatch_size, rng):
                 policy.step(rows[part])
@@ -187,13 +211,13 @@ class TwoPhaseLearner:
         def log_probs(rows: Slots) -> tuple[Tensor, Tensor]:
             index = torch.from_numpy(rows)
             if not joint:
-                return gaussian(*self.actor.control(observation[index]), control[index])
+                return gaussian(*self._distribution(self.actor.control, observation[index]), control[index])
             designing = is_design[index]
             log_prob, entropy = gaussian(
-                *self.actor.control(observation[index[~designing]]), control[index[~designing]]
+                *self._distribution(self.actor.control, observation[index[~designing]]), control[index[~designing]]
             )
             design_log_prob, design_entropy = gaussian(
-                *self.actor.design(observation[index[designing]]), design[index[designing]]
+                *self._distribution(self.actor.design, observation[index[designing]]), design[index[designing]]
             )
             share = float(designing.float().mean())
             both = (

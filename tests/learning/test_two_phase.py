@@ -162,7 +162,9 @@ def test_the_divergence_limit_stops_the_policy_but_not_the_value(
     report, batch = learner.train(BUDGET)
     assert report.metrics["policy_steps"] < 4
     learned = batch.env_steps if credit == "joint" else int((batch.valid & ~batch.is_design).sum())
-    assert sum(update.network is learner.value for update in recorder.value_steps) == 4 * round(learned / 30)
+    assert sum(update.optimizer is learner.optimizers["value"] for update in recorder.value_steps) == 4 * round(
+        learned / 30
+    )
 
 
 def test_designs_that_are_given_are_not_learned(make_learner: MakeLearner, recorder: Recorder) -> None:

@@ -1,0 +1,45 @@
+"""An update in bfloat16 learns nearly what the one in single precision does, and leaves weights in single precision."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from codesign_bench.learning.two_phase import TwoPhaseLearner
+from codesign_bench.method import Problem, load_method
+from codesign_bench.seeding import Streams
+from codesign_bench.task import load_task
+
+
+def learner(precision: str, credit: str) -> TwoPhaseLearner:
+    """Return a small graph-network learner on push."""
+    method = load_method("gnn_ppo")
+    small = {"batch_size": 700, "minibatch_size": 200, "epochs": 2, "kl_threshold": 1e9}
+    config = replace(method.config_class(), **small, precision=precision, design_credit=credit)
+    built: TwoPhaseLearner = method(Problem(load_task("push")), config, Streams(0)).learner  # type: ignore[attr-defined]
+    return built
+
+
+@pytest.mark.parametrize("credit", ["joint", "separate"])
+def test_both_precisions_learn_nearly_the_same(credit: str) -> None:
+    learners = {precision: learner(precision, credit) for precision in ("fp32", "bf16")}
+    start = torch.cat([p.detach().flatten() for p in learners["fp32"].actor.parameters()])
+    metrics = {precision: one.train(700)[0].metrics for precision, one in learners.items()}
+    weights = {
+        name: torch.cat([p.detach().flatten() for p in one.actor.parameters()]) for name, one in learners.items()
+    }
+    assert weights["bf16"].dtype == torch.float32
+    assert metrics["fp32"]["policy_steps"] == metrics["bf16"]["policy_steps"] > 0
+    moved = float((weights["fp32"] - start).norm())
+    apart = float((weights["fp32"] - weights["bf16"]).norm())
+    assert 0.0 < apart < 0.5 * moved
+    np.testing.assert_allclose(metrics["bf16"]["value_loss"], metrics["fp32"]["value_loss"], rtol=0.2)
+    np.testing.assert_allclose(metrics["bf16"]["kl"], metrics["fp32"]["kl"], rtol=0.5, atol=1e-3)
+
+
+def test_an_unknown_precision_is_refused() -> None:
+    with pytest.raises(ValueError, match="precision is 'fp32' or 'bf16', not 'half'"):
+        learner("half", "joint")

@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 
 import codesign_bench as cb
+from codesign_bench.config import differences, resolve
 from codesign_bench.evaluate import evaluate
+from codesign_bench.method import load_method
+from codesign_bench.results import read_cell
 
 REFERENCE = Path(__file__).resolve().parent.parent / "results" / "reference"
 METHODS: tuple[str, ...] = import_module("codesign_bench.methods").ORDER
@@ -33,3 +36,10 @@ def test_a_shipped_policy_gets_the_shipped_return(method: str) -> None:
     # Another processor rounds otherwise, and contact makes more of it: a few of 128 episodes may then end otherwise.
     assert evaluation.summary["return_mean"] == pytest.approx(rows["return_mean"].iloc[-1], abs=0.1)
     assert evaluation.summary["success_rate"] == pytest.approx(rows["success_rate"].iloc[-1], abs=0.06)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_default_profile_is_what_the_shipped_cells_were_run_with(method: str) -> None:
+    stored = read_cell(REFERENCE / "push" / method / "default" / "seed-00")
+    assert stored is not None
+    assert differences(stored["config"], resolve(load_method(method), "push", "laptop", []).as_json()) == []

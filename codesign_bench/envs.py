@@ -20,6 +20,8 @@ from codesign_bench.episodes import Episodes, Tradeoff
 from codesign_bench.task import Booleans, Floats, Singles, Slots, Task, load_task, task_names
 
 NAMESPACE = "codesign_bench"
+RGB_ARRAY = "rgb_array"
+"""The render mode."""
 
 
 def environment_id(task_name: str) -> str:
@@ -118,13 +120,14 @@ class ToolEnv(gymnasium.Env[Any, Any]):
         Terminated by success or failure, truncated at the time limit; `info["success"]` on the last step tells which.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - Gymnasium reads it from the class
+    metadata: dict[str, Any] = {"render_modes": [RGB_ARRAY]}  # noqa: RUF012 - Gymnasium reads it from the class
 
     def __init__(self, task_name: str, tradeoff: Tradeoff | None = None, render_mode: str | None = None) -> None:
         self.task = load_task(task_name)
         self.observation_space = observation_space(self.task)
         self.action_space = action_space(self.task)
         self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.task.control_period)}
         self._rollouts = _Rollouts(self.task, 1, tradeoff)
         self._slots: Slots = np.zeros(1, dtype=np.intp)
 
@@ -151,6 +154,10 @@ class ToolEnv(gymnasium.Env[Any, Any]):
         info = {"success": bool(self._rollouts.episodes.success(self._slots)[0])} if ended else {}
         return self._observation(), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
 
+    def render(self) -> Any:
+        """Return a picture of the scene, (height, width, 3), in RGB, with `render_mode="rgb_array"`; else None."""
+        return self._rollouts.episodes.simulator.render(0) if self.render_mode == RGB_ARRAY else None
+
     def _observation(self) -> Singles:
         return self._rollouts.episodes.observation[0].copy()
 
@@ -164,7 +171,7 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium reads it from the class
-        "render_modes": [],
+        "render_modes": [RGB_ARRAY],
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
@@ -174,6 +181,7 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
         self.task = load_task(task_name)
         self.num_envs = num_envs
         self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.task.control_period)}
         self.single_observation_space = observation_space(self.task)
         self.single_action_space = action_space(self.task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -220,6 +228,11 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
         if len(over):
             self._begin(over)
         return self._rollouts.episodes.observation.copy(), reward, terminated, truncated, self._info()
+
+    def render(self) -> tuple[Any, ...] | None:
+        """Return a picture of every scene with `render_mode="rgb_array"`; else None."""
+        simulator = self._rollouts.episodes.simulator
+        return tuple(simulator.render(slot) for slot in range(self.num_envs)) if self.render_mode == RGB_ARRAY else None
 
     def _begin(self, slots: Slots) -> None:
         self._rollouts.reset(slots, self._rollouts.sample([self._generators[slot] for slot in slots]))

@@ -24,6 +24,11 @@ class Tradeoff:
         return self.scale * (1.0 - (self.alpha * material + (1.0 - self.alpha) * effort))
 
 
+def portions(count: int, task: Task) -> list[Slots]:
+    """Return the numbers below `count` in as few near-equal portions as the task's simulators may have slots for."""
+    return list(np.array_split(np.arange(count), -(-count // task.max_slots)))
+
+
 class Episodes:
     """Runs `num_slots` independent two-phase episodes and keeps their observations (B, O) in one array.
 

@@ -6,14 +6,13 @@ Shapes: `N` evaluation instances, `I` instance, `D` design.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from codesign_bench.episodes import Episodes, Tradeoff
-from codesign_bench.method import Policy
-from codesign_bench.task import Booleans, Floats, Task
+from codesign_bench.episodes import Episodes, Tradeoff, portions
+from codesign_bench.task import Behaviour, Booleans, Floats, Task
 
 
 @dataclass(frozen=True)
@@ -32,6 +31,8 @@ class Evaluation:
     """(N,) control steps."""
     material: Floats
     """(N,) d_used / d_max of equation 1."""
+    outcomes: Floats
+    """(N,) the task's outcome quantity at the end."""
     effort: Floats
     """(N,) mean c_used / c_max of equation 1 over the episode."""
 
@@ -49,10 +50,18 @@ class Evaluation:
 
 
 def evaluate(
-    task: Task, policy: Policy, tradeoff: Tradeoff | None = None, instances: Floats | None = None
+    task: Task, policy: Behaviour, tradeoff: Tradeoff | None = None, instances: Floats | None = None
 ) -> Evaluation:
-    """Run one episode of `policy` on each of `instances` (N, I), by default the task's fixed ones, as one batch."""
+    """Run one episode of `policy` on each of `instances` (N, I), by default the task's fixed ones."""
     instances = task.evaluation_instances() if instances is None else instances
+    parts = [_play(task, policy, tradeoff, instances[part]) for part in portions(len(instances), task)]
+    return Evaluation(
+        **{field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Evaluation)}
+    )
+
+
+def _play(task: Task, policy: Behaviour, tradeoff: Tradeoff | None, instances: Floats) -> Evaluation:
+    """Run one episode on each of `instances` (N, I) in one simulator."""
     count = len(instances)
     slots = np.arange(count)
     episodes = Episodes(task, count, tradeoff)
@@ -74,6 +83,7 @@ def evaluate(
         returns=returns,
         successes=episodes.success(np.arange(count)).copy(),
         lengths=lengths,
+        outcomes=episodes.simulator.outcome.copy(),
         material=task.material(physical),
         effort=effort / np.maximum(lengths, 1.0),
     )

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codesign_bench.episodes import Episodes, Tradeoff
+from codesign_bench.errors import UserError
 from codesign_bench.registry import load, names
 from codesign_bench.seeding import Streams
-from codesign_bench.task import Floats, Singles, Task
+from codesign_bench.task import Behaviour, Floats, Task
 
 Array = NDArray[Any]
 
@@ -31,6 +32,8 @@ class Problem:
     cutout: float = 0.0
     """Fraction of the training region whose instances are never trained on."""
     tradeoff: Tradeoff | None = None
+    instances: Floats | None = None
+    """(k, I) the only instances to train and be judged on, or None: the task's own."""
 
     def make_episodes(self, num_slots: int) -> Episodes:
         """Return a batch of `num_slots` episodes of the task."""
@@ -38,6 +41,8 @@ class Problem:
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
         """Return (count, I) training instances: none from the cutout region."""
+        if self.instances is not None:
+            return self.instances[rng.integers(len(self.instances), size=count)]
         instances = self.task.sample_instances(rng, count)
         if self.cutout > 0.0:
             excluded = self.task.in_cutout(instances, self.cutout)
@@ -46,17 +51,13 @@ class Problem:
                 excluded = self.task.in_cutout(instances, self.cutout)
         return instances
 
+    def evaluation_instances(self) -> Floats:
+        """Return the (N, I) instances on which the method is judged."""
+        return self.task.evaluation_instances() if self.instances is None else self.instances
 
-class Policy(ABC):
-    """A designer and a controller that act with their means, as evaluation and everything after it uses them."""
 
-    @abstractmethod
-    def design(self, observation: Singles) -> Singles:
-        """Return the design (D,) or (B, D) in [-1, 1] for an observation (O,) or (B, O) of the design phase."""
-
-    @abstractmethod
-    def act(self, observation: Singles) -> Singles:
-        """Return the control (C,) or (B, C) in [-1, 1] for an observation (O,) or (B, O) of the control phase."""
+class Policy(Behaviour):
+    """A trained designer and controller that act with their means, as evaluation and everything after it uses them."""
 
     @abstractmethod
     def tensors(self) -> dict[str, Array]:
@@ -79,6 +80,8 @@ class BatchReport:
     """Simulated environment steps, design steps and every candidate's included."""
     metrics: dict[str, float]
     """Logged values by name, each explained on the method's page."""
+    gradient_steps: int = 0
+    """Gradient steps that changed the policy."""
 
 
 ConfigType = TypeVar("ConfigType")
@@ -103,6 +106,20 @@ class Method(ABC, Generic[ConfigType]):
     @abstractmethod
     def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
         """Return what `profile` sets for the task: key -> (value, source); unknown tasks get its general values."""
+
+    def use_cores(self, count: int) -> None:
+        """Use up to `count` cores from now on; no number may depend on it. By default a method uses one."""
+
+    def use_device(self, name: str) -> None:
+        """Compute updates on the device `name` ("cpu", "cuda") from now on. By default a method has no use for one."""
+
+    def start_from(self, tensors: Mapping[str, Array]) -> None:
+        """Take over a trained policy, as `Policy.tensors` described it, before any training.
+
+        Raises:
+            UserError: the method cannot.
+        """
+        raise UserError(f"method '{self.name}' cannot go on from a trained policy")
 
     @abstractmethod
     def train(self, remaining_steps: int) -> BatchReport:

@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Booleans = NDArray[np.bool_]
 Slots = NDArray[np.intp]
+Frame = NDArray[np.uint8]
 
 EVALUATION_SEED = 20231106
 """Seed of every task's fixed evaluation instances; training never uses it (ours)."""
@@ -111,6 +112,58 @@ class Layout:
         return self.phase.stop
 
 
+class Behaviour(ABC):
+    """A designer and a controller as functions of the observation: a task's script, or a trained policy."""
+
+    @abstractmethod
+    def design(self, observation: Singles) -> Singles:
+        """Return the design (D,) or (B, D) in [-1, 1] for an observation (O,) or (B, O) of the design phase."""
+
+    @abstractmethod
+    def act(self, observation: Singles) -> Singles:
+        """Return the control (C,) or (B, C) in [-1, 1] for an observation (O,) or (B, O) of the control phase."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a number of a task measures, and its unit."""
+
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Physics:
+    """What a scene looks like to someone who checks its physics."""
+
+    overlap: float
+    """Deepest overlap of two bodies that should not overlap, m; 0 when none do."""
+    speed: float
+    """Speed of the fastest body, the tool's excepted, m/s."""
+    contained: bool
+    """Whether every body is on its side of every wall and floor (or lies where it could have fallen)."""
+
+
+@dataclass(frozen=True)
+class Soundness:
+    """What a task promises of its physics, for any design and any control; tests hold it to that."""
+
+    overlap: float
+    """No two bodies overlap deeper than this, m."""
+    speed: float
+    """Nothing but the tool is ever faster than this, m/s."""
+    outcome_change: float
+    """Halving the physics step changes the outcome of a scripted episode by less than this, in the outcome's unit.
+
+    It holds for the median episode; where contact is chaotic, for the mean over instances, and a two-sample
+    Kolmogorov-Smirnov test does not tell the outcomes' distributions apart.
+    """
+    start_overlap: float = 1e-3
+    """Right after the design step, no design overlaps anything deeper than this, m."""
+    chaotic: bool = False
+    """Whether many bodies in contact make single episodes depend on the last bit."""
+
+
 class Simulator(ABC):
     """Many independent episodes of one task in one process; slot `i` holds one episode.
 
@@ -128,6 +181,8 @@ class Simulator(ABC):
         """(B,) whether the task is solved; ends the episode."""
         self.failure: Booleans = np.zeros(num_slots, dtype=bool)
         """(B,) whether the episode is lost for good (a cup that fell off the table); ends it, too."""
+        self.outcome: Floats = np.zeros(num_slots)
+        """(B,) the task's outcome quantity as it stands now; no part of the observation."""
 
     @abstractmethod
     def begin(self, slots: Slots, instances: Floats) -> None:
@@ -140,6 +195,30 @@ class Simulator(ABC):
     @abstractmethod
     def step(self, slots: Slots, controls: Floats) -> None:
         """Advance `slots` by one control step with `controls` (b, C) in [-1, 1]; write state, reward and both ends."""
+
+    def advance(self, slots: Slots) -> None:
+        """Make the engine's own physics steps of one control step, and nothing else: the raw cost of a step.
+
+        Raises:
+            NotImplementedError: the task has no engine.
+        """
+        raise NotImplementedError
+
+    def inspect(self, slot: int) -> Physics:
+        """Return what the scene in `slot` looks like to someone who checks its physics; changes nothing.
+
+        Raises:
+            NotImplementedError: the task does not tell.
+        """
+        raise NotImplementedError
+
+    def render(self, slot: int) -> Frame:
+        """Return a picture of the scene in `slot`, (height, width, 3), in RGB; needs no display and changes nothing.
+
+        Raises:
+            NotImplementedError: the task draws no pictures.
+        """
+        raise NotImplementedError
 
 
 class Task(ABC):
@@ -164,7 +243,13 @@ class Task(ABC):
     goal_size: ClassVar[int]
     """How many leading entries of an instance are the goal."""
     state_space: ClassVar[Box]
+    outcome: ClassVar[Quantity | None] = None
+    """What `Simulator.outcome` measures: how far the task got, whatever the reward."""
+    soundness: ClassVar[Soundness | None] = None
+    """What the task promises of its physics; built-in tasks all do."""
     num_evaluation_instances: ClassVar[int] = 128
+    max_slots: ClassVar[int] = 1_000
+    """Most slots to ask of one simulator when many episodes are to be played; a world may need much memory."""
 
     @property
     def goal_space(self) -> Box:
@@ -193,6 +278,14 @@ class Task(ABC):
         """
         raise UserError(f"--cutout: neither goals nor starts of task '{self.name}' are positions")
 
+    def fine_tuning_instances(self) -> Floats:
+        """Return the (b, I) instances outside the training region on which policies are tuned further (section 5.2).
+
+        Raises:
+            UserError: the task names none.
+        """
+        raise UserError(f"task '{self.name}' names no instances for fine-tuning")
+
     @abstractmethod
     def material(self, designs: Floats) -> Floats:
         """Return d_used / d_max in [0, 1] for designs (b, D) in their units (equation 1)."""
@@ -201,9 +294,25 @@ class Task(ABC):
     def effort(self, controls: Floats) -> Floats:
         """Return c_used / c_max in [0, 1] for controls (b, C) in [-1, 1] (equation 1)."""
 
+    def script(self) -> Behaviour:
+        """Return a designer and a controller written by hand, for pictures and checks: functions of the observation.
+
+        The controller uses whatever tool it is given. Neither needs to solve every instance.
+
+        Raises:
+            UserError: nobody wrote one.
+        """
+        raise UserError(f"task '{self.name}' has no script")
+
     @abstractmethod
-    def make_simulator(self, num_slots: int) -> Simulator:
-        """Return a simulator with `num_slots` slots."""
+    def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
+        """Return a simulator with `num_slots` slots.
+
+        Args:
+            num_slots: episodes side by side.
+            refinement: physics steps are this many times as many and as short (for checks; a task of a third party
+                may leave this argument out).
+        """
 
 
 def task_names() -> tuple[str, ...]:

@@ -7,13 +7,22 @@ Lengths are in m, angles in rad, times in s. The chain is the paper's (section "
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 import pymunk
+from PIL import Image, ImageDraw
 from pymunk import batch
 
-from codesign_bench.task import Box, Floats, Simulator, Slots, ToolGraph
+from codesign_bench.task import Box, Floats, Frame, Physics, Simulator, Slots, ToolGraph
+
+from ._scene import COLOURS, PICTURE_PIXELS, Clock
+
+Point: TypeAlias = Sequence[float]
+"""x and y, m."""
 
 LINK_HALF_WIDTH = 0.25
 """Half the thickness of a link, m (ours)."""
@@ -49,6 +58,21 @@ def chain_points(designs: Floats, first_link_angle: float) -> Floats:
     return points
 
 
+@dataclass(frozen=True)
+class View:
+    """The part of the plane that pictures show, m."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of a picture in pixels, both even, as video encoders want them."""
+        width, height = self.x[1] - self.x[0], self.y[1] - self.y[0]
+        scale = PICTURE_PIXELS / max(width, height)
+        return 2 * round(0.5 * scale * width), 2 * round(0.5 * scale * height)
+
+
 class PlanarSimulator(Simulator):
     """One pymunk space per slot, built anew for every episode so that nothing of the last one can reach the next.
 
@@ -56,8 +80,11 @@ class PlanarSimulator(Simulator):
     first the same in every episode.
     """
 
-    def __init__(self, num_slots: int, state_size: int, num_bodies: int) -> None:
+    view: ClassVar[View]
+
+    def __init__(self, num_slots: int, state_size: int, num_bodies: int, clock: Clock) -> None:
         super().__init__(num_slots, state_size)
+        self.clock = clock
         self.spaces: list[pymunk.Space] = [pymunk.Space() for _ in range(num_slots)]
         self.bodies: Floats = np.zeros((num_slots, num_bodies, 4))
         """(B, bodies, 4): x, y (m), vx, vy (m/s) of the bodies that `build_space` added, in its order."""
@@ -72,12 +99,13 @@ class PlanarSimulator(Simulator):
         for slot, chain in zip(slots.tolist(), points, strict=True):
             self.spaces[slot] = self.build_space(slot, chain)
 
-    def advance(self, slots: Slots, time_step: float, count: int) -> None:
-        """Step the spaces of `slots` `count` times by `time_step` seconds."""
+    def advance(self, slots: Slots) -> None:
+        """Make pymunk's steps of one control step in the spaces of `slots`."""
+        period, steps = self.clock.period, range(self.clock.steps)
         for slot in slots.tolist():
             step = self.spaces[slot].step
-            for _ in range(count):
-                step(time_step)
+            for _ in steps:
+                step(period)
 
     def read_bodies(self, slots: Slots) -> Floats:
         """Read positions and velocities of the bodies of `slots` into `bodies`; return them, (b, bodies, 4)."""
@@ -89,6 +117,88 @@ class PlanarSimulator(Simulator):
         # The space's own static body comes last; without sleeping, the others keep the order they were added in.
         self.bodies[slots] = rows[:, : self.bodies.shape[1]]
         return self.bodies[slots]
+
+    def inspect(self, slot: int) -> Physics:
+        """Return deepest overlap, fastest body and whether all moving bodies lie in the picture's part of the plane."""
+        space, view = self.spaces[slot], self.view
+        moving = [body for body in space.bodies if body.body_type == pymunk.Body.DYNAMIC]
+        inside = all(
+            view.x[0] <= body.position.x <= view.x[1] and view.y[0] <= body.position.y <= view.y[1] for body in moving
+        )
+        return Physics(
+            overlap=max((overlap(space, shape) for body in moving for shape in body.shapes), default=0.0),
+            speed=max((body.velocity.length for body in moving), default=0.0),
+            contained=inside,
+        )
+
+    def render(self, slot: int) -> Frame:
+        """Return a picture of every shape in the space, and of what the task adds in `mark`."""
+        canvas = Canvas(self.view)
+        self.mark(slot, canvas)
+        for kind in (pymunk.Body.STATIC, pymunk.Body.KINEMATIC, pymunk.Body.DYNAMIC):
+            for shape in self.spaces[slot].shapes:
+                if shape.body is not None and shape.body.body_type == kind:
+                    canvas.shape(shape, shape.body)
+        return canvas.frame()
+
+    def mark(self, slot: int, canvas: Canvas) -> None:
+        """Draw what is no body, below the bodies: a goal, a line. Nothing by default."""
+
+
+def overlap(space: pymunk.Space, shape: pymunk.Shape) -> float:
+    """Return how deep `shape` lies in any other shape that it may collide with, m."""
+    deepest = 0.0
+    for other in space.shape_query(shape):
+        if other.shape is not None and other.shape.body is not shape.body:
+            deepest = max(deepest, *(-point.distance for point in other.contact_point_set.points), 0.0)
+    return deepest
+
+
+class Canvas:
+    """A picture of a part of the plane, drawn at twice its size and then shrunk so that edges are smooth."""
+
+    OVERSAMPLING = 2
+
+    def __init__(self, view: View) -> None:
+        self.view = view
+        self._pixels = self.OVERSAMPLING * view.size[0] / (view.x[1] - view.x[0])
+        size = self.OVERSAMPLING * view.size[0], self.OVERSAMPLING * view.size[1]
+        self._image = Image.new("RGB", size, COLOURS["background"])
+        self._draw = ImageDraw.Draw(self._image)
+
+    def shape(self, shape: pymunk.Shape, body: pymunk.Body) -> None:
+        """Draw a circle, segment or polygon of `body` in the colour of its kind of body."""
+        kind = {pymunk.Body.DYNAMIC: "object", pymunk.Body.STATIC: "scene", pymunk.Body.KINEMATIC: "tool"}
+        colour = getattr(shape, "colour", COLOURS[kind[body.body_type]])
+        if isinstance(shape, pymunk.Circle):
+            self.circle(body.local_to_world(shape.offset), shape.radius, colour)
+        elif isinstance(shape, pymunk.Segment):
+            self.segment(body.local_to_world(shape.a), body.local_to_world(shape.b), shape.radius, colour)
+        elif isinstance(shape, pymunk.Poly):
+            self._draw.polygon([self._at(body.local_to_world(vertex)) for vertex in shape.get_vertices()], fill=colour)
+
+    def circle(self, centre: Point, radius: float, colour: str, *, filled: bool = True) -> None:
+        """Draw a disc, or its outline; `radius` in m."""
+        (x, y), r = self._at(centre), radius * self._pixels
+        box = (x - r, y - r, x + r, y + r)
+        if filled:
+            self._draw.ellipse(box, fill=colour)
+        else:
+            self._draw.ellipse(box, outline=colour, width=3 * self.OVERSAMPLING)
+
+    def segment(self, start: Point, end: Point, radius: float, colour: str) -> None:
+        """Draw a segment with round ends; `radius` is half its thickness, m."""
+        width = max(2 * self.OVERSAMPLING, round(2.0 * radius * self._pixels))
+        self._draw.line([self._at(start), self._at(end)], fill=colour, width=width)
+        for point in (start, end):
+            self.circle(point, 0.5 * width / self._pixels, colour)
+
+    def frame(self) -> Frame:
+        """Return the picture, (height, width, 3), in RGB."""
+        return np.asarray(self._image.resize(self.view.size, Image.Resampling.LANCZOS))
+
+    def _at(self, point: Point) -> tuple[float, float]:
+        return (point[0] - self.view.x[0]) * self._pixels, (self.view.y[1] - point[1]) * self._pixels
 
 
 def chain_tool(points: Floats, friction: float) -> tuple[pymunk.Body, list[pymunk.Segment]]:

@@ -5,13 +5,37 @@ Shapes: `b` slots a call names, `I` = 2 instance (goal x, y), `D` = 5 design, `C
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 import pymunk
 
 from codesign_bench.paper_tables import PLANAR_SCENES
-from codesign_bench.task import Booleans, Box, Floats, Simulator, Slots, Task
+from codesign_bench.task import (
+    Behaviour,
+    Booleans,
+    Box,
+    Floats,
+    Quantity,
+    Simulator,
+    Singles,
+    Slots,
+    Soundness,
+    Task,
+)
 
-from ._planar import CHAIN_GRAPH, LINK_HALF_WIDTH, PlanarSimulator, chain_design_space, chain_points, chain_tool
+from ._planar import (
+    CHAIN_GRAPH,
+    COLOURS,
+    LINK_HALF_WIDTH,
+    Canvas,
+    Clock,
+    PlanarSimulator,
+    View,
+    chain_design_space,
+    chain_points,
+    chain_tool,
+)
 
 TABLE = PLANAR_SCENES["push"]
 
@@ -48,10 +72,8 @@ REST_STEPS = 3
 SUCCESS_REWARD = 1.0
 """Added once, when the puck rests at the goal (ours; the paper lists one for its 3D tasks only)."""
 
-PHYSICS_STEPS = 2
-"""Physics steps per control step (ours)."""
-PHYSICS_PERIOD = 1.0 / 60.0
-"""s (the early scenes' time step)."""
+CLOCK = Clock(steps=2, period=1.0 / 60.0)
+"""Two physics steps per control step (ours), each as long as the early scenes', s."""
 
 
 class Push(Task):
@@ -102,7 +124,7 @@ class Push(Task):
     name = "push"
     title = "Push"
     horizon = TABLE.max_episode_steps
-    control_period = PHYSICS_STEPS * PHYSICS_PERIOD
+    control_period = CLOCK.control_period
     design_space = chain_design_space(
         TABLE.tool_length_init, TABLE.tool_length_ratio, TABLE.tool_angle_scale, TABLE.tool_angle_ratio
     )
@@ -125,6 +147,9 @@ class Push(Task):
         base_to_puck_x=(-25.0, 25.0, "m"),
         base_to_puck_y=(-25.0, 25.0, "m"),
     )
+
+    outcome = Quantity("distance from puck to goal", "m")
+    soundness = Soundness(overlap=LINK_HALF_WIDTH, speed=1.05 * np.sqrt(2.0) * MAX_SPEED, outcome_change=0.1)
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
         """Return (count, I) goals, uniform in the area of the ring around the puck."""
@@ -157,16 +182,22 @@ class Push(Task):
         speed: Floats = np.linalg.norm(controls, axis=1) / np.sqrt(controls.shape[1])
         return speed
 
-    def make_simulator(self, num_slots: int) -> Simulator:
+    def script(self) -> Behaviour:
+        """Return a script that pulls or pushes the puck with whichever part of a tool lies behind it."""
+        return _Script(self)
+
+    def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
         """Return a simulator of `num_slots` pucks and tools."""
-        return _PushSimulator(num_slots, self.state_space.size)
+        return _PushSimulator(num_slots, self.state_space.size, CLOCK.refined(refinement))
 
 
 class _PushSimulator(PlanarSimulator):
     """Puck on a table with dry friction and a kinematic tool, one pair per slot."""
 
-    def __init__(self, num_slots: int, state_size: int) -> None:
-        super().__init__(num_slots, state_size, num_bodies=2)
+    view = View(x=(4.0, 30.0), y=(-1.0, 17.0))
+
+    def __init__(self, num_slots: int, state_size: int, clock: Clock) -> None:
+        super().__init__(num_slots, state_size, num_bodies=2, clock=clock)
         self.goal = np.zeros((num_slots, 2))
         self.start_distance = np.ones(num_slots)
         self.distance = np.zeros(num_slots)
@@ -177,7 +208,7 @@ class _PushSimulator(PlanarSimulator):
         """Put pucks and held ends at their start and the goals where `instances` (b, I) say."""
         self.goal[slots] = instances
         self.start_distance[slots] = np.linalg.norm(PUCK_START - instances, axis=1)
-        self.distance[slots] = self.start_distance[slots]
+        self.distance[slots] = self.outcome[slots] = self.start_distance[slots]
         self.rest_steps[slots] = 0
         self.reward[slots] = 0.0
         self.success[slots] = False
@@ -212,14 +243,14 @@ class _PushSimulator(PlanarSimulator):
 
     def step(self, slots: Slots, controls: Floats) -> None:
         """Move the held ends by `controls` (b, C) for one control step and reward the pucks' progress."""
-        period = PHYSICS_STEPS * PHYSICS_PERIOD
+        period = self.clock.control_period
         base = self.bodies[slots, 1, :2]
         velocity = (np.clip(base + controls * (MAX_SPEED * period), *WORKSPACE.bounds) - base) / period
         for slot, pair in zip(slots.tolist(), velocity.tolist(), strict=True):
             tool = self.tools[slot]
             assert tool is not None, "a tool is built before it is moved"
             tool.velocity = tuple(pair)
-        self.advance(slots, PHYSICS_PERIOD, PHYSICS_STEPS)
+        self.advance(slots)
         puck = self.read_bodies(slots)[:, 0]
         distance = np.linalg.norm(puck[:, :2] - self.goal[slots], axis=1)
         resting = (distance < GOAL_RADIUS) & (np.linalg.norm(puck[:, 2:], axis=1) < REST_SPEED)
@@ -228,7 +259,12 @@ class _PushSimulator(PlanarSimulator):
         progress = (self.distance[slots] - distance) / self.start_distance[slots]
         self.reward[slots] = progress + TABLE.slack_reward + SUCCESS_REWARD * self.success[slots]
         self.distance[slots] = distance
+        self.outcome[slots] = distance
         self._write_state(slots)
+
+    def mark(self, slot: int, canvas: Canvas) -> None:
+        """Draw the goal."""
+        canvas.circle(self.goal[slot].tolist(), GOAL_RADIUS, COLOURS["goal"], filled=False)
 
     def _write_state(self, slots: Slots) -> None:
         bodies = self.bodies[slots]
@@ -236,6 +272,70 @@ class _PushSimulator(PlanarSimulator):
         self.state[slots, 4:6] = bodies[:, 1, :2]
         self.state[slots, 6:8] = self.goal[slots] - bodies[:, 0, :2]
         self.state[slots, 8:] = bodies[:, 0, :2] - bodies[:, 1, :2]
+
+
+class _Script(Behaviour):
+    """Brings a point of the tool behind the puck as seen from the goal, then moves on towards the goal.
+
+    Every link has a few candidate points on both of its sides; the one whose side faces the goal best and that is near
+    is taken. The way there is straight, so the puck may be pushed aside on it: what a tool is good for depends on its
+    shape.
+    """
+
+    SHAPES: ClassVar[tuple[tuple[float, ...], ...]] = (
+        (0.8, 0.9, -0.2, 0.2, 0.9),  # goals to the right: a long arm with a hook behind the puck
+        (0.8, 0.9, -0.2, 0.2, 0.9),  # right above: none of 500 random tools solves these with this controller
+        (-0.4, 0.2, -0.3, 0.5, 0.2),  # above: a slanted arm that lifts the puck on its way to the left
+        (-0.6, 0.8, -0.8, 0.4, -0.4),
+        (-0.2, 0.8, -0.8, 0.4, 0.6),  # left: down on the near side of the puck
+        (-0.2, -0.8, -0.3, -0.6, 0.5),
+        (0.9, -0.1, 0.8, -0.1, 0.5),  # below: a hollow arm above the puck
+        (0.6, -0.8, 0.8, 0.5, -0.6),
+    )
+    """The best of 500 random tools for goals in each eighth of all directions, from the right anticlockwise."""
+    POINTS_PER_LINK = 4
+    NEARNESS = 0.15
+    """What a metre of way costs, in units of the cosine between a link's side and the way to the goal."""
+
+    def __init__(self, task: Push) -> None:
+        self.task = task
+
+    def design(self, observation: Singles) -> Singles:
+        """Return one of eight tools by the goal's direction."""
+        to_goal = observation[..., 6:8]
+        count = len(self.SHAPES)
+        turn = np.arctan2(to_goal[..., 1], to_goal[..., 0]) / (2.0 * np.pi)
+        shapes: Singles = np.array(self.SHAPES, dtype=np.float32)[np.round(count * turn).astype(int) % count]
+        return shapes
+
+    def act(self, observation: Singles) -> Singles:
+        """Return the held end's velocity, normalised."""
+        seen = np.atleast_2d(observation).astype(np.float64)
+        puck, base, to_goal = seen[:, 0:2], seen[:, 4:6], seen[:, 6:8]
+        distance = np.linalg.norm(to_goal, axis=1, keepdims=True)
+        heading = to_goal / np.maximum(distance, 1e-9)
+        points, sides = self._places(seen[:, self.task.layout.design])
+        held = puck[:, None] - (PUCK_RADIUS + LINK_HALF_WIDTH) * sides - points
+        reachable = np.clip(held, *WORKSPACE.bounds)
+        cost = np.linalg.norm(reachable - base[:, None], axis=2) + 5.0 * np.linalg.norm(reachable - held, axis=2)
+        score = (sides * heading[:, None]).sum(axis=2) - self.NEARNESS * cost
+        rows = np.arange(len(seen))
+        way = held[rows, score.argmax(axis=1)] - base
+        ready = np.linalg.norm(way, axis=1, keepdims=True) < 0.4
+        speed = np.clip((distance - 0.5 * GOAL_RADIUS) / GOAL_RADIUS, 0.0, 0.7)
+        control = np.where(ready, way + speed * heading, np.clip(way, -1.0, 1.0))
+        result: Singles = np.clip(control, -1.0, 1.0).astype(np.float32)
+        return result if observation.ndim == 2 else result[0]
+
+    def _places(self, designs: Floats) -> tuple[Floats, Floats]:
+        """Return points on the links, from the held end, and the direction in which each pushes: (B, P, 2) twice."""
+        chain = chain_points(self.task.design_space.from_unit(designs), FIRST_LINK_ANGLE)
+        link = chain[:, 1:] - chain[:, :-1]
+        share = (np.arange(self.POINTS_PER_LINK) + 0.5) / self.POINTS_PER_LINK
+        points = (chain[:, :-1, None] + share[:, None] * link[:, :, None]).reshape(len(designs), -1, 2)
+        normal = np.stack([-link[..., 1], link[..., 0]], axis=-1) / np.linalg.norm(link, axis=-1, keepdims=True)
+        sides = np.repeat(normal, self.POINTS_PER_LINK, axis=1)
+        return np.concatenate([points, points], axis=1), np.concatenate([sides, -sides], axis=1)
 
 
 def start_shift(points: Floats) -> Floats:

@@ -42,8 +42,8 @@ def test_ids_follow_the_task_names(name: str, identifier: str) -> None:
 def test_gymnasium_has_nothing_to_complain_about(task_name: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = gymnasium.make(environment_id(task_name))
-        check_env(env.unwrapped, skip_render_check=True)
+        env = gymnasium.make(environment_id(task_name), render_mode="rgb_array")
+        check_env(env.unwrapped)
 
 
 @EVERY_TASK
@@ -150,3 +150,17 @@ def test_listing_environments_loads_neither_torch_nor_simulators() -> None:
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
     assert result.returncode == 0, result.stderr
+
+
+@EVERY_TASK
+def test_environments_render_to_pictures(task_name: str) -> None:
+    one = gymnasium.make(environment_id(task_name), render_mode="rgb_array")
+    one.reset(seed=0)
+    picture: Any = one.render()
+    assert picture.dtype == np.uint8
+    assert picture.shape[2] == 3
+    two = gymnasium.make_vec(environment_id(task_name), num_envs=2, render_mode="rgb_array")
+    two.reset(seed=0)
+    pictures: Any = two.render()
+    np.testing.assert_array_equal(pictures[0], picture)
+    assert gymnasium.make(environment_id(task_name)).unwrapped.render() is None

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codesign_bench.episodes import Tradeoff
+from codesign_bench.episodes import Tradeoff, portions
 from codesign_bench.evaluate import evaluate, rows
 from codesign_bench.task import Task, load_task
 
@@ -60,3 +60,14 @@ def test_rows_name_instances_and_designs_and_tell_what_was_cut_out(task: Task) -
     assert [row["design_length"] for row in found] == [1.0, 1.0]
     assert [row["success"] for row in found] == [1, 0]
     assert [row["in_cutout"] for row in found] == [0, 1]
+
+
+def test_an_evaluation_does_not_depend_on_how_many_episodes_a_simulator_holds(
+    task: Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_once = evaluate(task, constant(0.2, 0.5))
+    monkeypatch.setattr(type(task), "max_slots", 3)
+    assert [part.tolist() for part in portions(8, task)] == [[0, 1, 2], [3, 4, 5], [6, 7]]
+    in_turn = evaluate(task, constant(0.2, 0.5))
+    for name, values in vars(at_once).items():
+        np.testing.assert_array_equal(values, getattr(in_turn, name), err_msg=name)

@@ -44,6 +44,10 @@ class ToyReach(Task):
         """Cut out the goals below `fraction`."""
         return np.asarray(instances[:, 0] < fraction)
 
+    def fine_tuning_instances(self) -> Floats:
+        """Two goals, one of them out of the training region."""
+        return np.array([[1.2], [0.3]])
+
     def material(self, designs: Floats) -> Floats:
         """The stick's length over the longest."""
         return designs[:, 0] / 1.0
@@ -126,7 +130,11 @@ class ToySearch(Method[Config]):
         if earned > self.best_return:
             self.best, self.best_return = candidate, earned
         self.env_steps += env_steps
-        return BatchReport(env_steps, {"candidate_return": earned})
+        return BatchReport(env_steps, {"candidate_return": earned}, gradient_steps=1)
+
+    def start_from(self, tensors: Mapping[str, Array]) -> None:
+        """Take over a vector."""
+        self.best = np.asarray(tensors["vector"])
 
     def _misbehave(self) -> None:
         time.sleep(self.config.delay)

@@ -247,7 +247,7 @@ def test_a_sliding_puck_stops_by_the_documented_friction(angle: float) -> None:
     outcome = play(goal_at(push.GOAL_DISTANCE[1], angle + np.pi), stay, slide(speed, angle))
     np.testing.assert_allclose(outcome.puck[-1], outcome.puck[-2], atol=1e-9)
     # Semi-implicit steps are off by up to the way of one of them.
-    np.testing.assert_allclose(outcome.puck[-1] - push.PUCK_START, 3.0 * direction, atol=speed * push.PHYSICS_PERIOD)
+    np.testing.assert_allclose(outcome.puck[-1] - push.PUCK_START, 3.0 * direction, atol=speed * push.CLOCK.period)
 
 
 def test_a_puck_that_stops_at_the_goal_succeeds_and_one_that_passes_through_does_not() -> None:
@@ -274,8 +274,7 @@ def test_rewards_add_up_to_the_share_of_the_way_made(prepare: Callable[[pymunk.S
 def test_half_the_physics_step_leaves_the_outcome_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     goals = [goal_at(distance, np.pi) for distance in push.GOAL_DISTANCE]
     coarse = [play(goal, push_left, as_built) for goal in goals]
-    monkeypatch.setattr(push, "PHYSICS_PERIOD", 0.5 * push.PHYSICS_PERIOD)
-    monkeypatch.setattr(push, "PHYSICS_STEPS", 2 * push.PHYSICS_STEPS)
+    monkeypatch.setattr(push, "CLOCK", push.CLOCK.refined(2))
     fine = [play(goal, push_left, as_built) for goal in goals]
     for before, after in zip(coarse, fine, strict=True):
         assert before.success

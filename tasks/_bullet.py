@@ -1,0 +1,402 @@
+"""What the 3D tasks share: a simulator with one PyBullet world per slot, and a tool of boxes on a Cartesian gantry.
+
+Shapes: `B` slots, `b` the slots a call names, `N` moving bodies, `K` boxes of a tool, `A` axes of the gantry.
+Lengths are in m, angles in rad, times in s, masses in kg, forces in N. Rotations are quaternions (x, y, z, w).
+"""
+
+from __future__ import annotations
+
+import weakref
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import ClassVar
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from codesign_bench.errors import UserError
+from codesign_bench.task import Floats, Frame, Physics, Simulator, Slots
+
+from ._scene import COLOURS, PICTURE_PIXELS, Clock
+
+try:
+    import pybullet
+except ModuleNotFoundError as error:
+    raise UserError("3D tasks need pybullet (it has wheels for Python 3.10 and 3.11): pip install pybullet") from error
+
+GRAVITY = 9.81
+"""m/s^2."""
+CARRIAGE_MASS = 0.1
+"""Of each moving part of the gantry but the last, which is the tool (ours)."""
+MAX_SLOTS = 28
+"""For `Task.max_slots`: an idle world takes over 20 MB, and a cell should stay below 1 GB (ours)."""
+LEVEL = (0.0, 0.0, 0.0, 1.0)
+"""The rotation that turns nothing."""
+PICTURE_SHAPE = (3 * PICTURE_PIXELS // 4, PICTURE_PIXELS)
+"""Height and width of a picture in pixels."""
+
+_idle_worlds: list[int] = []
+"""Connections whose simulator is gone: making one takes tens of ms and 28 MB, so the next simulator takes them over."""
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """The boxes that make up `b` tools, in the frame of the held point."""
+
+    half_extents: Floats
+    """(b, K, 3)."""
+    centres: Floats
+    """(b, K, 3)."""
+    rotations: Floats
+    """(b, K, 4)."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where pictures of a scene are taken from."""
+
+    eye: tuple[float, float, float]
+    target: tuple[float, float, float]
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    field_of_view: float = 45.0
+    """Vertical, degrees."""
+    near: float = 0.1
+    """What is nearer than this is not drawn: a roof can be left out of a picture from above."""
+    far: float = 10.0
+
+
+def rotations_about(axis: int, angles: Floats) -> Floats:
+    """Return (..., 4) rotations about the x, y or z axis (0, 1, 2) by `angles` (...)."""
+    result = np.zeros((*np.shape(angles), 4))
+    result[..., axis] = np.sin(0.5 * angles)
+    result[..., 3] = np.cos(0.5 * angles)
+    return result
+
+
+def rotation_matrices(rotations: Floats) -> Floats:
+    """Return the (..., 3, 3) matrices of unit `rotations` (..., 4)."""
+    x, y, z, w = np.moveaxis(rotations, -1, 0)
+    rows = (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
+        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
+        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+class BulletSimulator(Simulator):
+    """One PyBullet world per slot, emptied before every episode so that nothing of the last one can reach the next.
+
+    The robot is a gantry: sliding joints along x, y and z, then turning joints about `turning_axes`, and behind them
+    the tool as one rigid shape. Its joint positions are the pose of the held point. Motors hold it at a commanded
+    velocity with limited force, so a tool that is blocked stops instead of pressing through.
+
+    A subclass fills a world in `build_scene`, calls `restart` from `begin`, `add_tools` from `build`, and
+    `drive`, `advance`, `read_tools` and `read_bodies` from `step`. Worlds are taken up at their first use and handed on
+    when the simulator is gone. Whatever a subclass sets in a world must be set again after `restart`; parameters of
+    the engine itself are set nowhere but here.
+    """
+
+    camera: ClassVar[Camera]
+    room: ClassVar[tuple[tuple[float, float], ...]]
+    """Lowest and highest x, y and z where the centres of moving bodies may be, m."""
+    turning_axes: ClassVar[tuple[int, ...]] = ()
+    """0, 1, 2 for x, y, z: the axes that the tool turns about, behind the three sliding joints."""
+    push_force: ClassVar[float] = 50.0
+    """Largest force of a sliding joint, N."""
+    turn_torque: ClassVar[float] = 10.0
+    """Largest torque of a turning joint, N m."""
+    tool_mass: ClassVar[float] = 0.5
+    tool_friction: ClassVar[float] = 1.0
+    """PyBullet multiplies the frictions of the two bodies of a contact."""
+    solver_iterations: ClassVar[int] = 50
+    contact_correction: ClassVar[float | None] = None
+    """Share of an overlap that a physics step takes away; None: PyBullet's own."""
+
+    def __init__(self, num_slots: int, state_size: int, num_bodies: int, clock: Clock) -> None:
+        super().__init__(num_slots, state_size)
+        self.clock = clock
+        self.worlds: list[int | None] = [None] * num_slots
+        self.moving: list[list[int]] = [[] for _ in range(num_slots)]
+        """The moving bodies of every world, tool excepted, as `build_scene` returned them."""
+        self.tools: list[int | None] = [None] * num_slots
+        self.bodies: Floats = np.zeros((num_slots, num_bodies, 13))
+        """(B, N, 13): position (3), rotation (4), velocity (3), angular velocity (3) of the moving bodies."""
+        self.pose: Floats = np.zeros((num_slots, 3 + len(self.turning_axes)))
+        """(B, A): pose of the held point."""
+        self._axes = list(range(self.pose.shape[1]))
+        self._forces = [self.push_force] * 3 + [self.turn_torque] * len(self.turning_axes)
+        weakref.finalize(self, _hand_on, self.worlds)
+
+    @abstractmethod
+    def build_scene(self, slot: int) -> list[int]:
+        """Add everything but the tool to the empty world of `slot`; return the bodies that move."""
+
+    def restart(self, slots: Slots) -> None:
+        """Empty the worlds of `slots` and build their scenes."""
+        for slot in slots.tolist():
+            world = self.worlds[slot]
+            if world is None:
+                world = self.worlds[slot] = _idle_worlds.pop() if _idle_worlds else pybullet.connect(pybullet.DIRECT)
+            pybullet.resetSimulation(physicsClientId=world)
+            pybullet.setPhysicsEngineParameter(
+                fixedTimeStep=self.clock.period,
+                numSolverIterations=self.solver_iterations,
+                deterministicOverlappingPairs=1,
+                physicsClientId=world,
+            )
+            if self.contact_correction is not None:
+                pybullet.setPhysicsEngineParameter(contactERP=self.contact_correction, physicsClientId=world)
+            pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=world)
+            self.tools[slot] = None
+            self.moving[slot] = self.build_scene(slot)
+        self.read_bodies(slots)
+
+    def add_box(
+        self,
+        slot: int,
+        half_extents: Sequence[float],
+        position: Sequence[float],
+        *,
+        mass: float = 0.0,
+        rotation: Sequence[float] = LEVEL,
+        friction: float = 1.0,
+        colour: str = COLOURS["scene"],
+    ) -> int:
+        """Add a box, fixed if it has no mass, to the world of `slot`; return its body."""
+        world = self.worlds[slot]
+        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half_extents, physicsClientId=world)
+        body: int = pybullet.createMultiBody(mass, shape, -1, position, rotation, physicsClientId=world)
+        pybullet.changeDynamics(
+            body, -1, lateralFriction=friction, linearDamping=0.0, angularDamping=0.0, physicsClientId=world
+        )
+        self.paint(slot, body, colour)
+        return body
+
+    def add_compound(
+        self,
+        slot: int,
+        half_extents: Sequence[Sequence[float]],
+        centres: Sequence[Sequence[float]],
+        position: Sequence[float],
+        *,
+        mass: float,
+        inertia: Sequence[float],
+        friction: float = 1.0,
+        colour: str = COLOURS["object"],
+    ) -> int:
+        """Add a loose body made of level boxes to the world of `slot`; return it.
+
+        Args:
+            slot: whose world.
+            half_extents: of its boxes, (K, 3).
+            centres: of its boxes, from its centre of mass, (K, 3).
+            position: of its centre of mass.
+            mass: of the whole.
+            inertia: about x, y and z, the principal axes, kg m^2.
+            friction: of all boxes.
+            colour: of all boxes, "#rrggbb".
+        """
+        world = self.worlds[slot]
+        shape = pybullet.createCollisionShapeArray(
+            shapeTypes=[pybullet.GEOM_BOX] * len(half_extents),
+            halfExtents=half_extents,
+            collisionFramePositions=centres,
+            physicsClientId=world,
+        )
+        # A body without joints is simulated faster as a rigid body of its own than as a tree of one link.
+        body: int = pybullet.createMultiBody(
+            mass, shape, -1, position, useMaximalCoordinates=True, physicsClientId=world
+        )
+        pybullet.changeDynamics(
+            body,
+            -1,
+            mass=mass,  # Without it, setting the inertia sets the mass to 0.
+            localInertiaDiagonal=inertia,
+            lateralFriction=friction,
+            linearDamping=0.0,
+            angularDamping=0.0,
+            physicsClientId=world,
+        )
+        self.paint(slot, body, colour)
+        return body
+
+    def paint(self, slot: int, body: int, colour: str, link: int = -1) -> None:
+        """Draw a body, or one of its links, in `colour` ("#rrggbb") from now on."""
+        pybullet.changeVisualShape(body, link, rgbaColor=_rgba(colour), physicsClientId=self.worlds[slot])
+
+    def add_tools(self, slots: Slots, boxes: Boxes, poses: Floats) -> None:
+        """Add a gantry with a tool of `boxes` to the worlds of `slots`, held at `poses` (b, A)."""
+        parts = boxes.half_extents.tolist(), boxes.centres.tolist(), boxes.rotations.tolist()
+        for slot, half_extents, centres, rotations, pose in zip(slots.tolist(), *parts, poses.tolist(), strict=True):
+            world = self.worlds[slot]
+            shape = pybullet.createCollisionShapeArray(
+                shapeTypes=[pybullet.GEOM_BOX] * len(half_extents),
+                halfExtents=half_extents,
+                collisionFramePositions=centres,
+                collisionFrameOrientations=rotations,
+                physicsClientId=world,
+            )
+            self.tools[slot] = self._add_gantry(world, shape, pose)
+            self.paint(slot, self._tool(slot), COLOURS["tool"], self._axes[-1])
+        self.pose[slots] = poses
+
+    def _add_gantry(self, world: int | None, shape: int, pose: Sequence[float]) -> int:
+        count = len(self._axes)
+        kinds = [pybullet.JOINT_PRISMATIC] * 3 + [pybullet.JOINT_REVOLUTE] * len(self.turning_axes)
+        tool: int = pybullet.createMultiBody(
+            0.0,
+            -1,
+            -1,
+            [0.0, 0.0, 0.0],
+            linkMasses=[CARRIAGE_MASS] * (count - 1) + [self.tool_mass],
+            linkCollisionShapeIndices=[-1] * (count - 1) + [shape],
+            linkVisualShapeIndices=[-1] * count,
+            linkPositions=[[0.0, 0.0, 0.0]] * count,
+            linkOrientations=[LEVEL] * count,
+            linkInertialFramePositions=[[0.0, 0.0, 0.0]] * count,
+            linkInertialFrameOrientations=[LEVEL] * count,
+            linkParentIndices=list(range(count)),
+            linkJointTypes=kinds,
+            linkJointAxis=np.eye(3)[[0, 1, 2, *self.turning_axes]].tolist(),
+            physicsClientId=world,
+        )
+        for axis, start in zip(self._axes, pose, strict=True):
+            pybullet.resetJointState(tool, axis, start, physicsClientId=world)
+            pybullet.changeDynamics(
+                tool,
+                axis,
+                lateralFriction=self.tool_friction,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                physicsClientId=world,
+            )
+        return tool
+
+    def drive(self, slots: Slots, displacements: Floats) -> None:
+        """Set the motors of `slots` such that the held points make `displacements` (b, A) in one control step."""
+        velocities = (displacements / self.clock.control_period).tolist()
+        for slot, velocity in zip(slots.tolist(), velocities, strict=True):
+            pybullet.setJointMotorControlArray(
+                self._tool(slot),
+                self._axes,
+                pybullet.VELOCITY_CONTROL,
+                targetVelocities=velocity,
+                forces=self._forces,
+                physicsClientId=self.worlds[slot],
+            )
+
+    def advance(self, slots: Slots) -> None:
+        """Make PyBullet's steps of one control step in the worlds of `slots`."""
+        step, steps = pybullet.stepSimulation, range(self.clock.steps)
+        for slot in slots.tolist():
+            world = self.worlds[slot]
+            for _ in steps:
+                step(world)
+
+    def read_tools(self, slots: Slots) -> Floats:
+        """Read the poses of the held points of `slots` into `pose`; return them, (b, A)."""
+        read, axes = pybullet.getJointStates, self._axes
+        rows = [[joint[0] for joint in read(self._tool(slot), axes, self.worlds[slot])] for slot in slots.tolist()]
+        self.pose[slots] = rows
+        return self.pose[slots]
+
+    def read_bodies(self, slots: Slots) -> Floats:
+        """Read places and velocities of the moving bodies of `slots` into `bodies`; return them, (b, N, 13)."""
+        place, motion = pybullet.getBasePositionAndOrientation, pybullet.getBaseVelocity
+        values: list[float] = []
+        for slot in slots.tolist():
+            world = self.worlds[slot]
+            for body in self.moving[slot]:
+                for part in (*place(body, world), *motion(body, world)):
+                    values.extend(part)
+        self.bodies[slots] = np.array(values).reshape(len(slots), -1, 13)
+        return self.bodies[slots]
+
+    def inspect(self, slot: int) -> Physics:
+        """Return deepest overlap of any two bodies, fastest body, and whether all moving bodies are in the room."""
+        world = self.worlds[slot]
+        loose = {*self.moving[slot], self._tool(slot)}
+        listed = {pybullet.getBodyUniqueId(index, world) for index in range(pybullet.getNumBodies(world))}
+        bodies = sorted(listed | loose)  # Of bodies that were made in one go, PyBullet lists only the last.
+        points = (
+            point
+            for first, second in combinations(bodies, 2)
+            if first in loose or second in loose
+            for point in pybullet.getClosestPoints(first, second, 0.0, physicsClientId=world)
+        )
+        states = self.bodies[slot]
+        low, high = np.array(self.room).T
+        return Physics(
+            overlap=max((-point[8] for point in points), default=0.0),
+            speed=float(np.linalg.norm(states[:, 7:10], axis=1).max(initial=0.0)),
+            contained=bool(((states[:, :3] >= low) & (states[:, :3] <= high)).all()),
+        )
+
+    def render(self, slot: int) -> Frame:
+        """Return a picture by PyBullet's own software renderer, with what the task adds in `mark`."""
+        camera, (height, width) = self.camera, PICTURE_SHAPE
+        view = pybullet.computeViewMatrix(camera.eye, camera.target, camera.up)
+        projection = pybullet.computeProjectionMatrixFOV(camera.field_of_view, width / height, camera.near, camera.far)
+        picture = pybullet.getCameraImage(
+            width,
+            height,
+            view,
+            projection,
+            shadow=0,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=self.worlds[slot],
+        )
+        pixels = np.asarray(picture[2], dtype=np.uint8).reshape(height, width, 4)[..., :3]
+        marks = Marks(pixels, np.reshape(view, (4, 4)) @ np.reshape(projection, (4, 4)))
+        self.mark(slot, marks)
+        return marks.frame()
+
+    def mark(self, slot: int, marks: Marks) -> None:
+        """Draw what is no body, above the bodies: a goal, a line. Nothing by default."""
+
+    def _tool(self, slot: int) -> int:
+        tool = self.tools[slot]
+        assert tool is not None, "a tool is built before it is moved"
+        return tool
+
+
+class Marks:
+    """Lines and dots on a picture of a scene, at places in the scene."""
+
+    def __init__(self, pixels: Frame, to_clip: Floats) -> None:
+        self._image = Image.fromarray(pixels)
+        self._draw = ImageDraw.Draw(self._image)
+        self._to_clip = to_clip
+
+    def line(self, points: Floats, colour: str, width: int = 2) -> None:
+        """Draw a line through `points` (n, 3), m; `width` in pixels."""
+        self._draw.line([tuple(pixel) for pixel in self._at(points).tolist()], fill=colour, width=width)
+
+    def dot(self, point: Floats, colour: str, radius: int = 3) -> None:
+        """Draw a disc at `point` (3,), m; `radius` in pixels."""
+        ((x, y),) = self._at(point[None, :3]).tolist()
+        self._draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=colour)
+
+    def frame(self) -> Frame:
+        """Return the picture, (height, width, 3), in RGB."""
+        return np.array(self._image)
+
+    def _at(self, points: Floats) -> Floats:
+        clip = np.pad(points, ((0, 0), (0, 1)), constant_values=1.0) @ self._to_clip
+        shares = 0.5 + 0.5 * clip[:, :2] / clip[:, 3:]
+        place: Floats = np.array(self._image.size) * np.stack([shares[:, 0], 1.0 - shares[:, 1]], axis=1)
+        return place
+
+
+def _hand_on(worlds: list[int | None]) -> None:
+    """Keep the connections of a simulator that is gone for the next one."""
+    _idle_worlds.extend(world for world in worlds if world is not None)
+
+
+def _rgba(colour: str) -> tuple[float, float, float, float]:
+    red, green, blue = (int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5))
+    return red, green, blue, 1.0

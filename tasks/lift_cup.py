@@ -1,0 +1,479 @@
+"""Lift cup: a held fork grips a cup under its rim and lifts it. Docstring of `LiftCup` has the details.
+
+Shapes: `B` slots, `b` slots a call names, `I` = 2 instance (cup's width and height), `D` = 5 design, `C` = 3 control,
+`K` = 9 boxes of a cup.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from codesign_bench.paper_tables import BOX_SCENES
+from codesign_bench.task import (
+    Behaviour,
+    Booleans,
+    Box,
+    Floats,
+    Quantity,
+    Simulator,
+    Singles,
+    Slots,
+    Soundness,
+    Task,
+    ToolGraph,
+)
+
+from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, rotation_matrices, rotations_about
+from ._scene import COLOURS, Clock
+
+TABLE = BOX_SCENES["lift_cup"]
+
+TOOL_START = np.array(TABLE.tool_position_init, dtype=np.float64)
+"""Where the held end of the handle starts, m (paper, table of lift cup); z is measured from the table top (ours)."""
+HANDLE_HALF_EXTENTS = np.array([0.01, 0.05, 0.01])
+"""Of the handle, m (ours; the paper says that it is fixed)."""
+BAR_THICKNESS = 0.02
+"""Of the cross bar, along y and z, m (ours)."""
+PRONG_START = 2.0 * HANDLE_HALF_EXTENTS[1] + BAR_THICKNESS
+"""Distance of the prongs' rear ends from the held end, along y, m (ours)."""
+TOOL_CLEARANCE = 0.002
+"""The lowest point of a tool stays this far above the table, m (ours)."""
+WORKSPACE = Box.of(held_x=(-0.15, 0.15, "m"), held_y=(1.1, 1.75, "m"), held_z=(0.0, 0.7, "m"))
+"""Where the held end may go (ours); a tool's lowest point limits z further."""
+MAX_MOVE = 0.02
+"""Longest way of the held end in a control step, m (ours): 0.48 m/s, too slow to bat a cup away."""
+
+CUP_UNIT = 0.18
+"""Width and height of a cup of scale 1, m (ours): rims of all widths fit between prongs of the design space."""
+CUP_START_Y = 1.65
+"""Where cups stand, x being 0, m (ours): no fork reaches a rim at the start."""
+CUP_MASS = 0.2
+"""kg (ours)."""
+WALL = 0.008
+"""Thickness of walls and bottom, m (ours)."""
+RIM_WIDTH = 0.02
+"""How far the rim stands out from the walls, m (ours): the play of a prong between wall and the rim's edge."""
+RIM_THICKNESS = 0.008
+"""m (ours)."""
+WALL_GAP = 0.002
+"""Walls end this high above the bottom's underside, m (ours): a cup on the table then has 4 contacts instead of 20."""
+CUP_FRICTION = 0.25
+"""Of the cup; table and tool have 1, and the engine multiplies (ours)."""
+TABLE_TOP = (-0.5, 0.5), (0.8, 2.4)
+"""Ends of the table along x and y, m (ours)."""
+TABLE_HALF_THICKNESS = 0.1
+"""m (ours)."""
+
+SUCCESS_HEIGHT = 0.4
+"""The cup's lowest corner must rise above this, m (paper, appendix "Real Robot Experiment Details")."""
+UPRIGHT = 0.9
+"""Cosine of the tilt up to which a cup is upright (ours): 26 degrees."""
+TIPPED = 0.7
+"""Cosine of the tilt beyond which a cup has tipped over (ours): 46 degrees."""
+FALLEN_HEIGHT = -0.05
+"""A cup whose centre is below this has fallen off the table, m (ours)."""
+
+LIFT_WEIGHT = 10.0
+"""Of the height in the reward, 1/m (ours)."""
+FIT_WEIGHT = 4.0
+"""Of the distance between prongs and rim in the reward, 1/m (ours)."""
+FIT_LENGTH = 0.03
+"""Within this distance the prongs count as fitting the rim, m (ours)."""
+PLAY = 0.25 * RIM_WIDTH
+"""Prongs this far from the middle of the rim still fit perfectly, m (ours)."""
+START_POTENTIAL = -1.0
+"""Of every episode's start: the one of prongs 0.25 m away (ours)."""
+
+CLOCK = Clock(steps=TABLE.control_steps_per_action, period=1.0 / 240.0)
+"""Ten physics steps per control step (paper, table of lift cup) of 1/240 s (ours)."""
+
+FORK_GRAPH = ToolGraph(num_nodes=4, edges=((0, 1), (1, 2), (1, 3)), parameter_nodes=(1, 2, 2, 2, 2))
+"""Handle, cross bar, left and right prong; the right prong is the left one's mirror image and has no own parameters."""
+
+
+class LiftCup(Task):
+    """Lift a cup of given width and height from the table (paper, appendix "Environment Details").
+
+    The tool is a fork: a handle, a cross bar and two prongs. The robot holds the end of the handle, moves it and never
+    turns it. The cup is square, closed at the bottom and has a rim that stands out. It is lifted by prongs that pass on
+    both sides of it, closer together than the edges of its rim: closer, they do not pass the walls; wider, they miss
+    the rim; too short, the cup tips. So the distance of the prongs must match the cup's width, with 20 mm of play on
+    each side, and none serves two cups whose widths differ by more than 40 mm, of 108 mm.
+
+    Action space
+        Design, 5: distance between the prongs' inner faces, tilt, width, length and height of the prongs (paper; the
+        handle is fixed, both prongs are alike). Control, 3: change of the held end's position, +-0.02 m along x, y and
+        z, at most 0.02 m in all (ours; the paper's +-0.1 m would be 2.4 m/s).
+
+    Observation
+        | index | what | unit | range |
+        | --- | --- | --- | --- |
+        | 0, 1, 2 | held end's position x, y, z | m | -0.15 .. 0.15, 1.1 .. 1.75, 0 .. 0.7 |
+        | 3, 4, 5 | cup's way from its start x, y, z | m | -1 .. 1 |
+        | 6, 7, 8 | from the point midway between the prongs to the cup's centre of mass x, y, z | m | -1 .. 1 |
+        | 9 | height of the rim's underside above the prongs' top, at the prongs' middle | m | -1 .. 1 |
+        | 10, 11 | free width between left and right prong and the cup's walls | m | -1 .. 1 |
+        | 12, 13, 14 | vertical parts of the cup's x, y and z axis | - | -1 .. 1 |
+        | 15 | how far the cup's y axis points along x (its turn about the vertical) | - | -1 .. 1 |
+        | 16, 17, 18 | cup's velocity x, y, z | m/s | -5 .. 5 |
+        | 19, 20 | cup's width and height, as scales | - | 0.3 .. 0.9 and 0.6 .. 0.9 |
+
+        followed by the design (5, normalised) and the phase (3). Before there is a tool, 6 to 11 are 0.
+
+    Design space
+        `LiftCup.design_space`; distance 0.04 to 0.2 m (ours, the range of the length), tilt +-30 degrees, positive with
+        the tips up, width 0.01 to 0.02 m, length 0.04 to 0.2 m, height 0.02 to 0.06 m (paper, box dimensions read as
+        half extents).
+
+    Goal space
+        The scale of the cup's width, 0.3 to 0.9, and of its height, 0.6 to 0.9 (the range of the paper's real cups),
+        uniform; times 0.18 m (ours).
+
+    Reward
+        Change of the potential 10 h - 4 d + f - 0.001 per control step; +10 on success (slack and success reward:
+        paper). h is the height of the cup's lowest corner in m, between 0 and 0.4, and 0 while the cup is not upright.
+        d in m is the mean distance from four points under the rim, two on each side of the cup, to the top edge of that
+        side's prong, 5 mm of it sideways for free; f is the mean of exp(-distance / 0.03 m). The potential starts at -1
+        whatever the tool, so a tool that fits earns its fit in the first step. A return lies below 16.
+
+    Starting state
+        Cup at rest at (0, 1.65), held end at (0, 1.2, 0.05) (paper), in m. Tools that would then be less than 2 mm
+        above the table start as much higher (ours).
+
+    Episode end
+        Success: the cup's lowest corner is higher than 0.4 m (paper) and its axis within 26 degrees of the vertical.
+        Failure: it is tipped by more than 46 degrees, or has fallen off the table. Time limit: 150 control steps
+        (paper) of 1/24 s.
+    """
+
+    name = "lift_cup"
+    title = "Lift cup"
+    horizon = TABLE.max_episode_steps
+    control_period = CLOCK.control_period
+    design_space = Box.of(
+        prong_distance=(2.0 * TABLE.box_dimensions_min[1], 2.0 * TABLE.box_dimensions_max[1], "m"),
+        prong_tilt=(float(np.deg2rad(TABLE.tool_angle_min[0])), float(np.deg2rad(TABLE.tool_angle_max[0])), "rad"),
+        prong_width=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
+        prong_length=(2.0 * TABLE.box_dimensions_min[1], 2.0 * TABLE.box_dimensions_max[1], "m"),
+        prong_height=(2.0 * TABLE.box_dimensions_min[2], 2.0 * TABLE.box_dimensions_max[2], "m"),
+    )
+    tool_graph = FORK_GRAPH
+    control_space = Box.of(
+        move_x=(-MAX_MOVE, MAX_MOVE, "m"), move_y=(-MAX_MOVE, MAX_MOVE, "m"), move_z=(-MAX_MOVE, MAX_MOVE, "m")
+    )
+    instance_space = Box.of(cup_width_scale=(0.3, 0.9, "0.18 m"), cup_height_scale=(0.6, 0.9, "0.18 m"))
+    goal_size = 2
+    state_space = Box.of(
+        held_x=(WORKSPACE.low[0], WORKSPACE.high[0], "m"),
+        held_y=(WORKSPACE.low[1], WORKSPACE.high[1], "m"),
+        held_z=(WORKSPACE.low[2], WORKSPACE.high[2], "m"),
+        cup_way_x=(-1.0, 1.0, "m"),
+        cup_way_y=(-1.0, 1.0, "m"),
+        cup_way_z=(-1.0, 1.0, "m"),
+        prongs_to_cup_x=(-1.0, 1.0, "m"),
+        prongs_to_cup_y=(-1.0, 1.0, "m"),
+        prongs_to_cup_z=(-1.0, 1.0, "m"),
+        prongs_to_rim_z=(-1.0, 1.0, "m"),
+        left_clearance=(-1.0, 1.0, "m"),
+        right_clearance=(-1.0, 1.0, "m"),
+        cup_x_axis_z=(-1.0, 1.0, "-"),
+        cup_y_axis_z=(-1.0, 1.0, "-"),
+        cup_z_axis_z=(-1.0, 1.0, "-"),
+        cup_y_axis_x=(-1.0, 1.0, "-"),
+        cup_velocity_x=(-5.0, 5.0, "m/s"),
+        cup_velocity_y=(-5.0, 5.0, "m/s"),
+        cup_velocity_z=(-5.0, 5.0, "m/s"),
+    )
+
+    outcome = Quantity("height of the cup's lowest corner while upright", "m")
+    max_slots = MAX_SLOTS
+    soundness = Soundness(overlap=WALL, speed=4.0, outcome_change=0.01)
+
+    def material(self, designs: Floats) -> Floats:
+        """Return the used share of the largest volume of prongs and cross bar for designs (b, D) in their units."""
+        used: Floats = _volume(designs) / _volume(self.design_space.bounds[1][None])
+        return used
+
+    def effort(self, controls: Floats) -> Floats:
+        """Return the share of the longest way of the held end for controls (b, C) in [-1, 1]."""
+        way: Floats = np.minimum(1.0, np.linalg.norm(controls, axis=1))
+        return way
+
+    def script(self) -> Behaviour:
+        """Return a script that puts the prongs beside the cup and lifts."""
+        return _Script(self)
+
+    def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
+        """Return a simulator of `num_slots` cups and forks."""
+        return _LiftCupSimulator(num_slots, self.state_space.size, CLOCK.refined(refinement))
+
+
+def _volume(designs: Floats) -> Floats:
+    """Return the volume (b,) of prongs and cross bar, m^3."""
+    distance, _, width, length, height = designs.T
+    volume: Floats = 2.0 * width * length * height + (distance + 2.0 * width) * BAR_THICKNESS**2
+    return volume
+
+
+def fork_boxes(designs: Floats) -> Boxes:
+    """Return handle, cross bar, left and right prong of designs (b, D) in the frame of the held end."""
+    distance, tilt, width, length, height = designs.T
+    count = len(designs)
+    half_extents, centres = np.zeros((count, 4, 3)), np.zeros((count, 4, 3))
+    half_extents[:, 0] = HANDLE_HALF_EXTENTS
+    centres[:, 0, 1] = HANDLE_HALF_EXTENTS[1]
+    half_extents[:, 1] = 0.5 * BAR_THICKNESS
+    half_extents[:, 1, 0] = 0.5 * distance + width
+    centres[:, 1, 1] = PRONG_START - 0.5 * BAR_THICKNESS
+    half_extents[:, 2:] = 0.5 * np.stack([width, length, height], axis=1)[:, None]
+    centres[:, 2:] = prong_middles(designs)[:, None]
+    centres[:, 2:, 0] = 0.5 * (distance + width)[:, None] * np.array([-1.0, 1.0])
+    rotations = rotations_about(0, np.stack([0.0 * tilt, 0.0 * tilt, tilt, tilt], axis=1))
+    return Boxes(half_extents, centres, rotations)
+
+
+def prong_middles(designs: Floats) -> Floats:
+    """Return the points (b, 3) midway between the two prongs' centres, from the held end."""
+    _, tilt, _, length, _ = designs.T
+    return np.stack([0.0 * tilt, PRONG_START + 0.5 * length * np.cos(tilt), 0.5 * length * np.sin(tilt)], axis=1)
+
+
+def lowest_points(designs: Floats) -> Floats:
+    """Return the height (b,) of the lowest point of tools with designs (b, D), from the held end; not positive."""
+    _, tilt, _, length, height = designs.T
+    prong = np.minimum(0.0, length * np.sin(tilt)) - 0.5 * height * np.cos(tilt)
+    lowest: Floats = np.minimum(prong, -max(HANDLE_HALF_EXTENTS[2], 0.5 * BAR_THICKNESS))
+    return lowest
+
+
+class _Cups:
+    """Boxes, centre of mass and inertia of cups of a width (b,) and a height (b,), in m and kg."""
+
+    def __init__(self, width: Floats, height: Floats) -> None:
+        half, rim = 0.5 * width, 0.5 * width + RIM_WIDTH
+        rim_half, wall_half = 0.5 * (RIM_WIDTH + WALL), 0.5 * (height - RIM_THICKNESS - WALL_GAP)
+        same = np.ones_like(width)
+        extents, places = [(half, half, 0.5 * WALL * same)], [(0.0 * same, 0.0 * same, 0.5 * WALL * same)]
+        for side in (-1.0, 1.0):
+            extents += [
+                (0.5 * WALL * same, half, wall_half),
+                (half - WALL, 0.5 * WALL * same, wall_half),
+                (rim_half * same, rim, 0.5 * RIM_THICKNESS * same),
+                (rim - 2.0 * rim_half, rim_half * same, 0.5 * RIM_THICKNESS * same),
+            ]
+            wall, edge = side * (half - 0.5 * WALL), side * (rim - rim_half)
+            middle, top = WALL_GAP + wall_half, height - 0.5 * RIM_THICKNESS
+            places += [
+                (wall, 0.0 * same, middle),
+                (0.0 * same, wall, middle),
+                (edge, 0.0 * same, top),
+                (0.0 * same, edge, top),
+            ]
+        self.half_extents: Floats = np.moveaxis(np.array(extents), -1, 0)
+        """(b, K, 3)"""
+        self.centres: Floats = np.moveaxis(np.array(places), -1, 0)
+        """(b, K, 3), from the centre of mass."""
+        volumes = self.half_extents.prod(axis=2)
+        masses = CUP_MASS * volumes / _sum_of_boxes(volumes)[:, None]
+        self.centre_height: Floats = _sum_of_boxes(masses * self.centres[..., 2]) / CUP_MASS
+        """(b,) of the centre of mass above the cup's underside."""
+        self.centres[..., 2] -= self.centre_height[:, None]
+        squares = _sum_of_boxes(masses[..., None] * (self.half_extents**2 / 3.0 + self.centres**2))
+        self.inertia: Floats = squares.sum(axis=1, keepdims=True) - squares
+        """(b, 3) about the cup's axes."""
+
+
+def _sum_of_boxes(values: Floats) -> Floats:
+    """Return the sum of values (b, K, ...) over boxes, one after the other.
+
+    NumPy's own sum of 8 and more values takes another order, and rounds otherwise, in one cup than in many.
+    """
+    total = np.zeros_like(values[:, 0])
+    for box in range(values.shape[1]):
+        total += values[:, box]
+    return total
+
+
+class _LiftCupSimulator(BulletSimulator):
+    """A cup on a table and a fork, one pair per slot."""
+
+    camera = Camera(eye=(0.75, 0.85, 0.55), target=(0.0, 1.55, 0.25))
+    room = (*TABLE_TOP, (0.0, 1.0))
+    _SIDES = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
+    """Left and right, near and far: the four points under the rim."""
+
+    def __init__(self, num_slots: int, state_size: int, clock: Clock) -> None:
+        super().__init__(num_slots, state_size, num_bodies=1, clock=clock)
+        self.size = np.zeros((num_slots, 2))
+        """(B, 2): width and height of the cup, m."""
+        self.centre_height = np.zeros(num_slots)
+        """(B,) of the cup's centre of mass above its underside, m."""
+        self.cup_start = np.zeros((num_slots, 3))
+        self.designs = np.zeros((num_slots, 5))
+        self.prong_middle = np.zeros((num_slots, 3))
+        self.lowest_hold = np.zeros(num_slots)
+        """(B,) smallest allowed height of the held end, m."""
+        self.potential = np.zeros(num_slots)
+        self._cups: dict[int, tuple[list[list[float]], list[list[float]], list[float]]] = {}
+
+    def begin(self, slots: Slots, instances: Floats) -> None:
+        """Put cups of the sizes that `instances` (b, I) say on their tables."""
+        size = CUP_UNIT * instances
+        cups = _Cups(*size.T)
+        self.size[slots] = size
+        self.centre_height[slots] = cups.centre_height
+        self.cup_start[slots] = np.stack(
+            [0.0 * size[:, 0], np.full(len(slots), CUP_START_Y), cups.centre_height], axis=1
+        )
+        parts = cups.half_extents.tolist(), cups.centres.tolist(), cups.inertia.tolist()
+        self._cups.update(zip(slots.tolist(), zip(*parts, strict=True), strict=True))
+        self.restart(slots)
+        self.potential[slots] = START_POTENTIAL
+        self.reward[slots] = self.outcome[slots] = 0.0
+        self.success[slots] = self.failure[slots] = False
+        self.pose[slots] = TOOL_START
+        self.state[slots] = 0.0
+        self.state[slots, :3] = TOOL_START
+        self.state[slots, 14] = 1.0
+
+    def build_scene(self, slot: int) -> list[int]:
+        """Add table and cup."""
+        half, middle = zip(*(((high - low) / 2.0, (high + low) / 2.0) for low, high in TABLE_TOP), strict=True)
+        self.add_box(slot, (*half, TABLE_HALF_THICKNESS), (*middle, -TABLE_HALF_THICKNESS))
+        half_extents, centres, inertia = self._cups[slot]
+        cup = self.add_compound(
+            slot,
+            half_extents,
+            centres,
+            self.cup_start[slot].tolist(),
+            mass=CUP_MASS,
+            inertia=inertia,
+            friction=CUP_FRICTION,
+            colour=COLOURS["object"],
+        )
+        return [cup]
+
+    def build(self, slots: Slots, designs: Floats) -> None:
+        """Add forks of `designs` (b, D), at the start or, if they would be too low there, higher."""
+        self.designs[slots] = designs
+        self.prong_middle[slots] = prong_middles(designs)
+        self.lowest_hold[slots] = TOOL_CLEARANCE - lowest_points(designs)
+        poses = np.tile(TOOL_START, (len(slots), 1))
+        poses[:, 2] = np.maximum(poses[:, 2], self.lowest_hold[slots])
+        self.add_tools(slots, fork_boxes(designs), poses)
+        self._observe(slots)
+
+    def step(self, slots: Slots, controls: Floats) -> None:
+        """Move the held ends by `controls` (b, C) and reward cups that rise and prongs that come to fit."""
+        pose = self.pose[slots]
+        length = np.linalg.norm(controls, axis=1, keepdims=True)
+        low, high = (np.tile(bound, (len(slots), 1)) for bound in WORKSPACE.bounds)
+        low[:, 2] = self.lowest_hold[slots]
+        target = np.clip(pose + controls * (MAX_MOVE / np.maximum(1.0, length)), low, high)
+        self.drive(slots, target - pose)
+        self.advance(slots)
+        self.read_tools(slots)
+        self.read_bodies(slots)
+        potential = self._observe(slots)
+        self.reward[slots] = (
+            potential - self.potential[slots] + TABLE.slack_reward + TABLE.success_reward * self.success[slots]
+        )
+        self.potential[slots] = potential
+
+    def mark(self, slot: int, marks: Marks) -> None:
+        """Draw a square at the height to which the cup must be lifted."""
+        x, y = 0.12 * np.array([[-1.0, 1.0, 1.0, -1.0, -1.0], [-1.0, -1.0, 1.0, 1.0, -1.0]])
+        marks.line(np.column_stack([x, y + CUP_START_Y, np.full(5, SUCCESS_HEIGHT)]), COLOURS["goal"])
+
+    def _observe(self, slots: Slots) -> Floats:
+        """Write state, outcome and both ends; return the reward's potential (b,)."""
+        held, cup = self.pose[slots], self.bodies[slots, 0]
+        width, height = self.size[slots].T
+        place, turn = cup[:, :3], rotation_matrices(cup[:, 3:7])
+        axes = turn[:, 2]
+        lowest = place[:, 2] - 0.5 * width * np.abs(axes[:, :2]).sum(axis=1) - self.centre_height[slots] * axes[:, 2]
+        upright = axes[:, 2] > UPRIGHT
+        lifted = np.where(upright, np.maximum(lowest, 0.0), 0.0)
+        self.outcome[slots] = lifted
+        self.success[slots] = lifted > SUCCESS_HEIGHT
+        self.failure[slots] = (axes[:, 2] < TIPPED) | (place[:, 2] < FALLEN_HEIGHT)
+
+        middle = held + self.prong_middle[slots]
+        distance, tilt, _, _, prong_height = self.designs[slots].T
+        prong_top = middle[:, 2] + 0.5 * prong_height / np.cos(tilt)
+        rim = height - RIM_THICKNESS - self.centre_height[slots]
+        state = self.state
+        state[slots, 0:3] = held
+        state[slots, 3:6] = place - self.cup_start[slots]
+        state[slots, 6:9] = place - middle
+        state[slots, 9] = place[:, 2] + rim - prong_top
+        state[slots, 10] = place[:, 0] - held[:, 0] + 0.5 * (distance - width)
+        state[slots, 11] = held[:, 0] - place[:, 0] + 0.5 * (distance - width)
+        state[slots, 12:15] = axes
+        state[slots, 15] = turn[:, 0, 1]
+        state[slots, 16:19] = cup[:, 7:10]
+
+        misfit = self._misfit(slots, place, turn, rim)
+        fit = np.exp(-misfit / FIT_LENGTH) - FIT_WEIGHT * misfit
+        potential: Floats = fit.mean(axis=1) + LIFT_WEIGHT * np.minimum(lifted, SUCCESS_HEIGHT)
+        return potential
+
+    def _misfit(self, slots: Slots, place: Floats, turn: Floats, rim: Floats) -> Floats:
+        """Return the distances (b, 4) of points under the rim from the top edges of the prongs.
+
+        The points lie in the middle of the rim, left and right, a quarter of the cup's width before and behind its
+        centre. A distance has a part along x from the prong's inner face, less the play, one along y beyond the
+        prong's ends, and one along z from its top edge.
+        """
+        width = self.size[slots, 0]
+        local = np.empty((len(slots), 4, 3))
+        local[..., 0] = (0.5 * (width + RIM_WIDTH))[:, None] * self._SIDES[:, 0]
+        local[..., 1] = (0.25 * width)[:, None] * self._SIDES[:, 1]
+        local[..., 2] = rim[:, None]
+        points = place[:, None] + local @ turn.swapaxes(1, 2) - self.pose[slots][:, None]
+        distance, tilt, _, length, height = self.designs[slots].T[..., None]
+        along = np.clip(points[..., 1], PRONG_START, PRONG_START + length * np.cos(tilt))
+        top = (along - PRONG_START) * np.tan(tilt) + 0.5 * height / np.cos(tilt)
+        points[..., 0] = np.maximum(np.abs(points[..., 0] - 0.5 * distance * self._SIDES[:, 0]) - PLAY, 0.0)
+        points[..., 1] -= along
+        points[..., 2] -= top
+        result: Floats = np.linalg.norm(points, axis=2)
+        return result
+
+
+class _Script(Behaviour):
+    """Brings the prongs' middle, or the cross bar, up to the cup with the prongs at its sides; then lifts."""
+
+    TOLERANCE = 0.004
+    """The held end this near to its aim lifts, m."""
+    BAR_DISTANCE = 0.005
+    """Free way that the cross bar leaves before the cup's wall, m."""
+    LIFTED = 0.003
+    """A cup this high is on its way up, whatever its place, m."""
+    PRONGS: ClassVar[tuple[float, ...]] = (0.0, 0.015, 0.2, 0.04)
+    """Tilt (rad), width, length and height (m) of the script's own tools."""
+
+    def __init__(self, task: LiftCup) -> None:
+        self.task = task
+
+    def design(self, observation: Singles) -> Singles:
+        """Return long level prongs whose inner faces pass under the middle of the rim."""
+        seen = np.atleast_2d(observation)
+        width = CUP_UNIT * seen[:, self.task.layout.goal][:, 0]
+        designs = np.column_stack([width + RIM_WIDTH, np.tile(self.PRONGS, (len(seen), 1))])
+        result: Singles = self.task.design_space.to_unit(designs).astype(np.float32)
+        return result if observation.ndim == 2 else result[0]
+
+    def act(self, observation: Singles) -> Singles:
+        """Return the held end's move, normalised."""
+        seen = np.atleast_2d(observation).astype(np.float64)
+        _, tilt, _, length, _ = self.task.design_space.from_unit(seen[:, self.task.layout.design]).T
+        width = CUP_UNIT * seen[:, self.task.layout.goal][:, 0]
+        short_of_cup = np.maximum(0.0, 0.5 * width + self.BAR_DISTANCE - 0.5 * length * np.cos(tilt))
+        way = seen[:, 6:8] - np.column_stack([0.0 * width, short_of_cup])
+        there: Booleans = (np.abs(way) < self.TOLERANCE).all(axis=1) | (seen[:, 5] > self.LIFTED)
+        moves = np.column_stack([way / MAX_MOVE, there])
+        result: Singles = np.clip(moves, -1.0, 1.0).astype(np.float32)
+        return result if observation.ndim == 2 else result[0]

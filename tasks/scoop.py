@@ -1,0 +1,557 @@
+"""Scoop: a ladle of three links lifts a wanted number of balls out of a pile. Docstring of `Scoop` has the details.
+
+Shapes: `B` slots, `b` slots a call names, `N` = 40 balls, `P` piles, `I` = 3 instance (wanted balls, pile, shift),
+`D` = 5 design, `C` = 3 control.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+import pymunk
+
+from codesign_bench.paper_tables import PLANAR_SCENES
+from codesign_bench.task import (
+    Behaviour,
+    Booleans,
+    Box,
+    Floats,
+    Physics,
+    Quantity,
+    Simulator,
+    Singles,
+    Slots,
+    Soundness,
+    Task,
+)
+
+from ._planar import (
+    CHAIN_GRAPH,
+    COLOURS,
+    Canvas,
+    Clock,
+    PlanarSimulator,
+    View,
+    chain_design_space,
+    chain_points,
+    overlap,
+)
+
+TABLE = PLANAR_SCENES["scoop"]
+
+TOOL_START = np.array(TABLE.tool_position_init, dtype=np.float64)
+"""Where the tool starts, m (paper, table of scoop): x of its first joint and y of its lowest point (our reading)."""
+START_SHIFT = 0.4
+"""The first joint starts up to this far to the left or right of there, m (ours)."""
+FIRST_LINK_ANGLE = -np.pi / 3.0
+"""The first link, the handle, points down to the right; the others curl up and make a ladle, rad (ours)."""
+LINK_HALF_WIDTH = 0.12
+"""Half the thickness of a link, m (ours): a fifth of a ball's radius, so that a tool takes little room in the pile."""
+TOOL_MASS = 8.0
+"""kg (ours); its centre is the first joint."""
+TOOL_MOMENT = 80.0
+"""Moment of inertia about the first joint, kg m^2 (ours)."""
+TOOL_FRICTION = 1.0
+"""Of the links' surface (ours); pymunk multiplies the two frictions of a contact."""
+
+HAND_FORCE = 600.0
+"""The hand moves the tool with at most this force, N (ours): an unstoppable tool would shoot balls out of the pile."""
+HAND_TORQUE = 2400.0
+"""The hand turns the tool with at most this torque, N m (ours)."""
+MAX_SPEED = 1.5
+"""Largest speed of the first joint along each axis, m/s (ours): out of the pile takes about 18 of the 30 steps."""
+MAX_ACCELERATION = 3.0
+"""The hand's velocity along an axis changes at most this fast, m/s^2 (ours): balls can hardly be shaken off."""
+MAX_TURN = 0.3
+"""Largest angular velocity of the tool, rad/s (ours)."""
+MAX_TILT = 0.1
+"""The hand tilts the tool by at most this from its start, rad (ours): less than it takes to make balls slide."""
+
+NUM_BALLS = 40
+"""(paper, appendix "Environment Details")."""
+BALL_RADIUS = 0.6
+"""m (ours)."""
+BALL_MASS = float(np.pi * BALL_RADIUS**2)
+"""kg: 1 kg/m^2 (scale of the first author's early scenes)."""
+BALL_FRICTION = 0.2
+"""Of the balls' surface (ours). Balls do not turn, so they never roll: they rest on slopes of up to 11 degrees."""
+WALL_FRICTION = 0.5
+"""Of floor and walls (ours)."""
+GRAVITY = 10.0
+"""m/s^2 (ours)."""
+DAMPING = 0.5
+"""Share of its velocity that a body keeps over 1 s (ours); nothing falls faster than gravity / ln 2 = 14.4 m/s."""
+
+CLEARANCE = 2.0 * BALL_RADIUS + LINK_HALF_WIDTH + 0.08
+"""Every joint and end of the tool keeps this far from floor and walls, m (ours): a ball fits between unsqueezed."""
+FLOOR = float(TOOL_START[1]) - CLEARANCE
+"""y of the floor, m (ours): tools start as low as they may go."""
+RESERVOIR = (9.5, 24.0)
+"""x of the reservoir's walls, m (ours): room for the widest tool at every start."""
+RIM = 14.0
+"""y of the upper ends of these walls, m (ours): above the piles, which are about 4.8 m deep."""
+YARD = (6.0, 27.5)
+"""x of the outer walls, which keep spilled balls in the picture, m (ours)."""
+WALL_HALF_WIDTH = 0.5
+"""Half the thickness of floor and walls, m (ours)."""
+LINE = 15.0
+"""A ball whose centre is above this is out of the reservoir, y in m (ours): 1 m above the rim."""
+CLEAR = LINE - BALL_RADIUS - LINK_HALF_WIDTH
+"""A tool whose lowest point is above this is clear: every ball that rests on it is out, y in m."""
+CEILING = CLEAR + 0.5
+"""The hand lifts the tool's lowest point no higher than this, y in m (ours)."""
+
+GOAL_NUMBERS = (1, 7)
+"""Smallest and largest wanted number of balls (paper, appendix "Environment Details")."""
+REST_SPEED = 0.3
+"""A ball on the tool is at rest when it moves slower than this relative to the tool, m/s (ours)."""
+HELD_STEPS = 3
+"""Control steps in a row for which the wanted number must be held at rest (ours)."""
+NUMBER_EXPONENT = 1.5
+"""How sharply progress prefers the wanted number (ours)."""
+SUCCESS_REWARD = 1.0
+"""Added once, when the wanted number is held (ours; the paper lists one for its 3D tasks only)."""
+
+NUM_PILES = 32
+"""Different piles (ours)."""
+PILE_SEED = 40
+"""Seed of the places from which balls fall into the piles (ours)."""
+PILE_STEPS = 240
+"""Physics steps in which a pile comes to rest (ours)."""
+HEAP_COLUMNS = np.linspace(RESERVOIR[0] + BALL_RADIUS, RESERVOIR[1] - BALL_RADIUS, 11)
+"""x of the columns in which balls lie that make room for the tool, m (ours): balls in neighbouring ones are apart."""
+GAP = 0.02
+"""Balls that make room lie this far above others at least, and no ball starts closer to the tool, m (ours)."""
+
+CLOCK = Clock(steps=TABLE.control_steps_per_action, period=1.0 / 30.0)
+"""Physics steps per control step (paper, table of scoop), each of 1/30 s (ours)."""
+ITERATIONS = 8
+"""Of the contact solver in every physics step (ours)."""
+SLOP = 0.02
+"""Overlap of two bodies that the contact solver leaves alone, m (ours)."""
+
+
+class Scoop(Task):
+    """Scoop a wanted number of balls out of a reservoir (paper, appendix "Environment Details").
+
+    Seen from the side. The tool is a chain of three links: a handle and two more that curl up into a ladle. It starts
+    inside the pile. The hand moves it gently and tilts it a little, with limited force. It can hardly shake or pour
+    balls off, and sees them only once they are out, so the number of balls that stay on the tool is decided by its
+    shape: a deep or long ladle for many, a short one for few.
+
+    Action space
+        Design, 5: lengths of three links, 1.8 to 7.2 m, 0.9 to 3.6 m and 0.9 to 3.6 m, and the two angles between them,
+        -9 to 63 degrees (paper, table of scoop). Control, 3: velocity of the first joint, +-1.5 m/s along x and y,
+        and angular velocity, +-0.3 rad/s (ranges ours). The velocity changes by at most 3 m/s^2, the tool tilts by at
+        most 0.1 rad and keeps 1.4 m from floor and walls (ours).
+
+    Observation
+        | index | what | unit | range |
+        | --- | --- | --- | --- |
+        | 0, 1 | first joint's position x, y | m | 0 .. 40 |
+        | 2 | tilt | rad | -1 .. 1 |
+        | 3 | y of the tool's lowest point | m | 0 .. 40 |
+        | 4, 5 | first joint's velocity x, y | m/s | -20 .. 20 |
+        | 6 | angular velocity | rad/s | -10 .. 10 |
+        | 7 | balls held out of the reservoir | balls | 0 .. 40 |
+        | 8 | the same less the wanted number | balls | -40 .. 40 |
+        | 9 | control steps in a row with the wanted number at rest | steps | 0 .. 3 |
+        | 10 - 13 | from first joint to second joint and to tip x, y | m | -10 .. 10 |
+        | 14 - 20 | whether 1, 2, ..., 7 balls are wanted | | 0 .. 1 |
+        | 21 | wanted number | balls | 1 .. 7 |
+
+        followed by the design (5, normalised) and the phase (3).
+
+    Design space
+        `Scoop.design_space`; length = 6, 3, 3 m (1 + r), r in [-0.7, 0.2]; angle = 90 degrees r, r in [-0.1, 0.7].
+
+    Goal space
+        1 to 7 balls of 40 (paper), all alike often (ours).
+
+    Reward
+        Change of h (min(1 + k, 1 + n) / max(1 + k, 1 + n))^1.5 - 0.001 per control step, n the wanted number, k the
+        number of balls vertically above the tool, h the share of the way up, from y = 10 m to 14.78 m, that the tool's
+        lowest point has made; +1 on success. An episode's return lies below 2.
+
+    Starting state
+        One of 32 piles, nearly at rest; the tool upright in it, its first joint at x = 15 m (paper) +-0.4 m and its
+        lowest point at y = 10 m (paper; our reading), 1.4 m above the floor. Balls that would overlap it lie on top of
+        the pile and fall into place in the first second (ours).
+
+    Episode end
+        Success: for 3 control steps the tool is clear of the reservoir, that is, its lowest point is above y = 14.28 m,
+        and as many balls as wanted are vertically above it, all slower than 0.3 m/s relative to it. Time limit: 30
+        control steps of 1/6 s, five physics steps each (30 and five are the paper's).
+    """
+
+    name = "scoop"
+    title = "Scoop"
+    horizon = TABLE.max_episode_steps
+    control_period = CLOCK.control_period
+    design_space = chain_design_space(
+        TABLE.tool_length_init, TABLE.tool_length_ratio, TABLE.tool_angle_scale, TABLE.tool_angle_ratio
+    )
+    tool_graph = CHAIN_GRAPH
+    control_space = Box.of(
+        velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"),
+        velocity_y=(-MAX_SPEED, MAX_SPEED, "m/s"),
+        angular_velocity=(-MAX_TURN, MAX_TURN, "rad/s"),
+    )
+    instance_space = Box.of(
+        wanted=(*GOAL_NUMBERS, "balls"), pile=(0, NUM_PILES - 1, ""), start_shift=(-START_SHIFT, START_SHIFT, "m")
+    )
+    goal_size = 1
+    state_space = Box.of(
+        joint_1_x=(0.0, 40.0, "m"),
+        joint_1_y=(0.0, 40.0, "m"),
+        tilt=(-1.0, 1.0, "rad"),
+        lowest_y=(0.0, 40.0, "m"),
+        velocity_x=(-20.0, 20.0, "m/s"),
+        velocity_y=(-20.0, 20.0, "m/s"),
+        angular_velocity=(-10.0, 10.0, "rad/s"),
+        held=(0.0, NUM_BALLS, "balls"),
+        held_less_wanted=(-NUM_BALLS, NUM_BALLS, "balls"),
+        held_steps=(0.0, HELD_STEPS, "steps"),
+        joint_1_to_joint_2_x=(-10.0, 10.0, "m"),
+        joint_1_to_joint_2_y=(-10.0, 10.0, "m"),
+        joint_1_to_tip_x=(-10.0, 10.0, "m"),
+        joint_1_to_tip_y=(-10.0, 10.0, "m"),
+        **{f"wants_{number}": (0.0, 1.0, "") for number in range(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)},
+    )
+
+    outcome = Quantity("balls held out of the reservoir", "balls")
+    soundness = Soundness(overlap=0.5 * BALL_RADIUS, speed=12.0, outcome_change=0.3, chaotic=True)
+
+    def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
+        """Return (count, I) instances: number and pile all alike often, shift uniform."""
+        wanted = rng.integers(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1, size=count)
+        pile = rng.integers(NUM_PILES, size=count)
+        shift = rng.uniform(-START_SHIFT, START_SHIFT, size=count)
+        return np.stack([wanted, pile, shift], axis=1)
+
+    def material(self, designs: Floats) -> Floats:
+        """Return the used share of the largest total link length for designs (b, D) in their units."""
+        total: Floats = designs[:, :3].sum(axis=1) / sum(self.design_space.high[:3])
+        return total
+
+    def effort(self, controls: Floats) -> Floats:
+        """Return the share of the largest velocity, all three entries normalised, for controls (b, C) in [-1, 1]."""
+        speed: Floats = np.linalg.norm(controls, axis=1) / np.sqrt(controls.shape[1])
+        return speed
+
+    def script(self) -> Behaviour:
+        """Return a script that lifts whatever tool it is given straight up, and designs a ladle for every number."""
+        return _Script(self)
+
+    def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
+        """Return a simulator of `num_slots` piles and tools."""
+        return _ScoopSimulator(num_slots, self.state_space.size, CLOCK.refined(refinement))
+
+
+class _ScoopSimulator(PlanarSimulator):
+    """A pile of balls in a reservoir and a tool that a hand of limited force moves, one of each per slot."""
+
+    view = View(x=(YARD[0] - 1.0, YARD[1] + 1.0), y=(FLOOR - 0.6, 24.0))
+
+    def __init__(self, num_slots: int, state_size: int, clock: Clock) -> None:
+        super().__init__(num_slots, state_size, num_bodies=NUM_BALLS + 1, clock=clock)
+        self.wanted = np.ones(num_slots)
+        self.chain = np.zeros((num_slots, 4, 2))
+        """(B, 4, 2) points of the upright tool from its first joint, m."""
+        self.turn = np.zeros((num_slots, 2))
+        """(B, 2) tilt, rad, and angular velocity, rad/s."""
+        self.lowest = np.zeros(num_slots)
+        """(B,) y of the tool's lowest point, m."""
+        self.held_steps = np.zeros(num_slots)
+        self.hand_velocity = np.zeros((num_slots, 2))
+        """(B, 2) of the hands in the last control step, m/s."""
+        self.progress = np.zeros(num_slots)
+        self.balls: list[Balls | None] = [None] * num_slots
+        self.tools: list[pymunk.Body | None] = [None] * num_slots
+        self.hands: list[pymunk.Body | None] = [None] * num_slots
+
+    def begin(self, slots: Slots, instances: Floats) -> None:
+        """Put the piles of `instances` (b, I) into the reservoirs."""
+        wanted, pile = np.rint(instances[:, :2]).astype(int).T
+        self.wanted[slots] = wanted
+        self.bodies[slots] = 0.0
+        self.bodies[slots, :NUM_BALLS, :2] = settled_piles()[pile]
+        self.bodies[slots, NUM_BALLS, :2] = TOOL_START
+        self.bodies[slots, NUM_BALLS, 0] += instances[:, 2]
+        self.chain[slots] = 0.0
+        for values in (self.turn, self.hand_velocity, self.outcome, self.held_steps, self.progress, self.reward):
+            values[slots] = 0.0
+        self.success[slots] = False
+        self.lowest[slots] = TOOL_START[1]
+        self._write_state(slots, self.chain[slots])
+
+    def build(self, slots: Slots, designs: Floats) -> None:
+        """Dig the tools of `designs` (b, D) into the piles."""
+        points = chain_points(designs, FIRST_LINK_ANGLE)
+        chain = points - points[:, 1:2]
+        self.chain[slots] = chain
+        self.bodies[slots, NUM_BALLS, 1] = TOOL_START[1] - chain[..., 1].min(axis=1)
+        places = chain + self.bodies[slots, NUM_BALLS, None, :2]
+        for slot, tool in zip(slots.tolist(), places, strict=True):
+            self.bodies[slot, :NUM_BALLS, :2] = make_room(self.bodies[slot, :NUM_BALLS, :2], tool)
+        self.add_spaces(slots, chain)
+        self._look(slots)
+
+    def build_space(self, slot: int, points: Floats) -> pymunk.Space:
+        """Return the scene of one episode: reservoir, balls, tool, and the hand that moves it."""
+        space, balls = empty_reservoir(), self.balls[slot]
+        if balls is None:
+            balls = self.balls[slot] = Balls.new()
+            balls.move(None, space, self.bodies[slot, :NUM_BALLS, :2])
+        else:
+            balls.move(self.spaces[slot], space, self.bodies[slot, :NUM_BALLS, :2])
+        tool = pymunk.Body(TOOL_MASS, TOOL_MOMENT)
+        tool.position = tuple(self.bodies[slot, NUM_BALLS, :2].tolist())
+        links = [pymunk.Segment(tool, tuple(a), tuple(b), LINK_HALF_WIDTH) for a, b in pairwise(points.tolist())]
+        for link in links:
+            link.friction = TOOL_FRICTION
+            link.colour = COLOURS["tool"]
+        # The hand's velocity alone counts, not its place: neither joint corrects a lag (bias).
+        hand = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        grip, wrist = pymunk.PivotJoint(hand, tool, (0.0, 0.0), (0.0, 0.0)), pymunk.GearJoint(hand, tool, 0.0, 1.0)
+        grip.max_bias = wrist.max_bias = 0.0
+        grip.max_force, wrist.max_force = HAND_FORCE, HAND_TORQUE
+        space.add(tool, *links, hand, grip, wrist)
+        self.tools[slot], self.hands[slot] = tool, hand
+        return space
+
+    def step(self, slots: Slots, controls: Floats) -> None:
+        """Move the hands by `controls` (b, C) for one control step and reward what is lifted."""
+        velocity, turn = self._allowed(slots, controls)
+        for slot, pair, spin in zip(slots.tolist(), velocity.tolist(), turn.tolist(), strict=True):
+            hand = self.hands[slot]
+            assert hand is not None, "a tool is built before it is moved"
+            hand.velocity = tuple(pair)
+            hand.angular_velocity = spin
+        self.advance(slots)
+        self.read_bodies(slots)
+        tools = [self.tools[slot] for slot in slots.tolist()]
+        self.turn[slots] = [(tool.angle, tool.angular_velocity) for tool in tools if tool is not None]
+        before = self.progress[slots]
+        self._look(slots)
+        self.success[slots] = self.held_steps[slots] >= HELD_STEPS
+        reward = self.progress[slots] - before + TABLE.slack_reward + SUCCESS_REWARD * self.success[slots]
+        self.reward[slots] = reward
+
+    def inspect(self, slot: int) -> Physics:
+        """Return the balls' deepest overlap, the speed of the fastest, and whether all are inside the outer walls."""
+        space = self.spaces[slot]
+        balls = [shape for shape in space.shapes if isinstance(shape, pymunk.Circle)]
+        places = self.bodies[slot, :NUM_BALLS, :2]
+        inside = (places[:, 0] > YARD[0]) & (places[:, 0] < YARD[1]) & (places[:, 1] > FLOOR)
+        return Physics(
+            overlap=max(overlap(space, ball) for ball in balls),
+            speed=float(np.linalg.norm(self.bodies[slot, :NUM_BALLS, 2:], axis=1).max()),
+            contained=bool(inside.all()),
+        )
+
+    def mark(self, slot: int, canvas: Canvas) -> None:
+        """Draw the height from which on a ball is out of the reservoir."""
+        canvas.segment((YARD[0], LINE), (YARD[1], LINE), 0.0, COLOURS["goal"])
+
+    def _allowed(self, slots: Slots, controls: Floats) -> tuple[Floats, Floats]:
+        """Return velocity (b, 2) and angular velocity (b,) for `controls` (b, C) that keep tools where they may be."""
+        period = self.clock.control_period
+        tilt = self.turn[slots, 0]
+        next_tilt = np.clip(tilt + controls[:, 2] * (MAX_TURN * period), -MAX_TILT, MAX_TILT)
+        points = rotated(self.chain[slots], next_tilt)
+        low, high = points.min(axis=1), points.max(axis=1)
+        least = np.array([RESERVOIR[0] + CLEARANCE, TOOL_START[1]]) - low
+        most = np.stack([RESERVOIR[1] - CLEARANCE - high[:, 0], CEILING - low[:, 1]], axis=1)
+        middle = 0.5 * (least + most)  # A tool that tilting made too wide for both clearances stays in the middle.
+        joint, change = self.bodies[slots, NUM_BALLS, :2], MAX_ACCELERATION * period
+        before = self.hand_velocity[slots]
+        wish = joint + np.clip(controls[:, :2] * MAX_SPEED, before - change, before + change) * period
+        target = np.clip(wish, np.minimum(least, middle), np.maximum(most, middle))
+        velocity: Floats = np.clip((target - joint) / period, -MAX_SPEED, MAX_SPEED)
+        self.hand_velocity[slots] = velocity
+        turn: Floats = np.clip((next_tilt - tilt) / period, -MAX_TURN, MAX_TURN)
+        return velocity, turn
+
+    def _look(self, slots: Slots) -> None:
+        """Count balls and measure progress; write the state."""
+        balls, tool = self.bodies[slots, :NUM_BALLS], self.bodies[slots, NUM_BALLS, None]
+        wanted, chain = self.wanted[slots], rotated(self.chain[slots], self.turn[slots, 0])
+        self.lowest[slots] = lowest = tool[:, 0, 1] + chain[..., 1].min(axis=1)
+        loaded = above(balls[..., :2] - tool[..., :2], chain)
+        number = loaded.sum(axis=1)
+        self.outcome[slots] = held = np.where(lowest > CLEAR, number, 0)
+        moving = ((balls[..., 2:] - tool[..., 2:]) ** 2).sum(axis=2) > REST_SPEED**2
+        right = (held == wanted) & ~(loaded & moving).any(axis=1)
+        self.held_steps[slots] = np.where(right, self.held_steps[slots] + 1.0, 0.0)
+        lift = np.clip((lowest - TOOL_START[1]) / (CEILING - TOOL_START[1]), 0.0, 1.0)
+        ratio = (1.0 + np.minimum(number, wanted)) / (1.0 + np.maximum(number, wanted))
+        self.progress[slots] = lift * ratio**NUMBER_EXPONENT
+        self._write_state(slots, chain)
+
+    def _write_state(self, slots: Slots, chain: Floats) -> None:
+        tool, wanted = self.bodies[slots, NUM_BALLS], self.wanted[slots]
+        state = np.empty((len(slots), self.state.shape[1]))
+        state[:, 0:2], state[:, 4:6] = tool[:, :2], tool[:, 2:]
+        state[:, 2], state[:, 6] = self.turn[slots].T
+        state[:, 3] = self.lowest[slots]
+        state[:, 7], state[:, 8] = self.outcome[slots], self.outcome[slots] - wanted
+        state[:, 9] = self.held_steps[slots]
+        state[:, 10:14] = chain[:, 2:].reshape(-1, 4)
+        state[:, 14:] = wanted[:, None] == np.arange(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)
+        self.state[slots] = state
+
+
+class _Script(Behaviour):
+    """Lifts the tool straight up, so that its shape alone decides how many balls stay on it."""
+
+    SHAPES: ClassVar[tuple[tuple[float, ...], ...]] = (
+        (-0.3, -0.8, -0.9, -0.1, 0.3),
+        (-0.5, 0.0, -0.9, -0.4, 1.0),
+        (0.1, -0.9, -0.7, 0.6, 0.6),
+        (0.5, -1.0, -0.6, 0.9, -0.5),
+        (0.1, -0.9, 0.1, 0.6, 0.4),
+        (0.8, 0.4, -0.9, 0.6, 0.4),
+        (0.2, 0.0, 0.8, 0.8, 0.9),
+    )
+    """A ladle for each of 1 to 7 balls, normalised: the best of a few hundred random tools."""
+
+    def __init__(self, task: Scoop) -> None:
+        self.task = task
+
+    def design(self, observation: Singles) -> Singles:
+        """Return the ladle for the wanted number."""
+        wanted = np.rint(observation[..., self.task.layout.goal][..., 0]).astype(int)
+        shapes: Singles = np.array(self.SHAPES, dtype=np.float32)[wanted - GOAL_NUMBERS[0]]
+        return shapes
+
+    def act(self, observation: Singles) -> Singles:
+        """Return straight up, normalised."""
+        result: Singles = np.zeros((*observation.shape[:-1], self.task.control_space.size), dtype=np.float32)
+        result[..., 1] = 1.0
+        return result
+
+
+def empty_reservoir() -> pymunk.Space:
+    """Return a space with floor and walls, whose inner faces lie at `FLOOR`, `RESERVOIR` and `YARD`, and gravity."""
+    space = pymunk.Space()
+    space.gravity = (0.0, -GRAVITY)
+    space.damping = DAMPING
+    space.iterations = ITERATIONS
+    space.collision_slop = SLOP
+    half, top = WALL_HALF_WIDTH, CEILING + 10.0
+    ends = [((YARD[0], FLOOR - half), (YARD[1], FLOOR - half))]
+    ends += [((x, FLOOR), (x, RIM - half)) for x in (RESERVOIR[0] - half, RESERVOIR[1] + half)]
+    ends += [((x, FLOOR), (x, top)) for x in (YARD[0] - half, YARD[1] + half)]
+    walls = [pymunk.Segment(space.static_body, *pair, half) for pair in ends]
+    for wall in walls:
+        wall.friction = WALL_FRICTION
+    space.add(*walls)
+    return space
+
+
+@dataclass(frozen=True)
+class Balls:
+    """Balls that go from one episode's space to the next one's, which takes half the time that new ones take."""
+
+    bodies: list[pymunk.Body]
+    discs: list[pymunk.Circle]
+
+    @classmethod
+    def new(cls, radius: float = BALL_RADIUS) -> Balls:
+        """Make balls of `radius`, m, that are in no space."""
+        bodies = [pymunk.Body(BALL_MASS, float("inf")) for _ in range(NUM_BALLS)]
+        discs = [pymunk.Circle(body, radius) for body in bodies]
+        for disc in discs:
+            disc.friction = BALL_FRICTION
+        return cls(bodies, discs)
+
+    def move(self, before: pymunk.Space | None, after: pymunk.Space, places: Floats) -> None:
+        """Take the balls out of one space and put them into another, at rest at `places` (N, 2).
+
+        A step without shapes comes in between: it uses up the corrections of overlaps that pymunk keeps for the next
+        step, so that nothing of the last episode is left.
+        """
+        if before is not None:
+            before.remove(*self.bodies, *self.discs)
+        after.add(*self.bodies)
+        after.step(CLOCK.period)
+        for body, place in zip(self.bodies, places.tolist(), strict=True):
+            body.position = tuple(place)
+            body.velocity = (0.0, 0.0)
+        after.add(*self.discs)
+
+
+@cache
+def settled_piles() -> Floats:
+    """Return the balls' places in all piles, (P, N, 2), in m: dropped row by row and left to come to rest.
+
+    They come to rest as slightly larger balls, so that the balls of an episode do not overlap at its start; then, too,
+    they slump a little.
+    """
+    rng = np.random.default_rng(PILE_SEED)
+    row, column = np.divmod(np.arange(NUM_BALLS), 8)
+    width = (RESERVOIR[1] - RESERVOIR[0]) / 8.0
+    jitter = rng.uniform(-1.0, 1.0, size=(NUM_PILES, NUM_BALLS)) * (0.5 * width - BALL_RADIUS - 2.0 * SLOP)
+    result = np.empty((NUM_PILES, NUM_BALLS, 2))
+    for pile in range(NUM_PILES):
+        x, y = RESERVOIR[0] + (column + 0.5) * width + jitter[pile], FLOOR + (2.1 * row + 1.0) * BALL_RADIUS
+        space = empty_reservoir()
+        balls = Balls.new(BALL_RADIUS + 1.5 * SLOP)
+        balls.move(None, space, np.stack([x, y], axis=1))
+        for _ in range(PILE_STEPS):
+            space.step(CLOCK.period)
+        result[pile] = [body.position for body in balls.bodies]
+    result.flags.writeable = False  # It is shared by all simulators.
+    return result
+
+
+def make_room(balls: Floats, tool: Floats) -> Floats:
+    """Return `balls` (N, 2) with those that overlap the tool with points `tool` (4, 2) put on top of the pile.
+
+    They lie in columns, the lowest places first, at rest and clear of the tool and of one another.
+    """
+    clear = BALL_RADIUS + LINK_HALF_WIDTH + GAP
+    moved = distances(balls, tool) < clear
+    rest = balls[~moved]
+    square = (2.0 * BALL_RADIUS) ** 2 - (HEAP_COLUMNS[:, None] - rest[:, 0]) ** 2
+    touching = np.where(square > 0.0, rest[:, 1] + np.sqrt(np.maximum(square, 0.0)), FLOOR + BALL_RADIUS)
+    layers = (2.0 * BALL_RADIUS + GAP) * np.arange(4)[:, None] + GAP
+    heights = touching.max(axis=1) + layers
+    heap = np.stack([np.broadcast_to(HEAP_COLUMNS, heights.shape), heights], axis=-1).reshape(-1, 2)
+    free = heap[distances(heap, tool) > clear]
+    lowest = np.argsort(free[:, 1], kind="stable")
+    result = balls.copy()
+    result[moved] = free[lowest[: int(moved.sum())]]
+    return result
+
+
+def distances(places: Floats, tool: Floats) -> Floats:
+    """Return the distance (N,) of `places` (N, 2) from the middle line of a chain with points `tool` (4, 2)."""
+    start, link = tool[:-1], tool[1:] - tool[:-1]
+    offset = places[:, None] - start
+    share = np.clip((offset * link).sum(axis=2) / (link * link).sum(axis=1), 0.0, 1.0)
+    nearest: Floats = ((offset - share[..., None] * link) ** 2).sum(axis=2).min(axis=1)
+    return np.sqrt(nearest)
+
+
+def above(places: Floats, chains: Floats) -> Booleans:
+    """Tell which `places` (b, N, 2) are vertically above a link of the chains with points (b, 4, 2)."""
+    start, link = chains[:, None, :-1], np.diff(chains, axis=1)[:, None]
+    offset = places[:, :, None] - start
+    wide = np.abs(link[..., 0]) > 1e-9
+    share = np.where(wide, offset[..., 0] / np.where(wide, link[..., 0], 1.0), -1.0)
+    over = (share > 0.0) & (share < 1.0) & (offset[..., 1] > share * link[..., 1])
+    result: Booleans = np.any(over, axis=2)
+    return result
+
+
+def rotated(points: Floats, angles: Floats) -> Floats:
+    """Return `points` (b, 4, 2) turned about the origin by `angles` (b,), rad."""
+    cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    x, y = points[..., 0], points[..., 1]
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)

@@ -1,0 +1,608 @@
+"""Scoop 3D: a scoop is lifted out of a reservoir with as many balls as are wanted. Docstring of `Scoop3D` has more.
+
+Shapes: `b` slots a call names, `I` = 2 instance (balls wanted, pile), `D` = 10 design, `C` = 6 control, `N` = 40 balls,
+`P` = 4 side plates (back, front, left, right), `K` = 6 boxes of a tool.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+import pybullet
+
+from codesign_bench.paper_tables import BOX_SCENES
+from codesign_bench.task import (
+    Behaviour,
+    Booleans,
+    Box,
+    Floats,
+    Physics,
+    Quantity,
+    Simulator,
+    Singles,
+    Slots,
+    Soundness,
+    Task,
+    ToolGraph,
+)
+
+from ._bullet import LEVEL, MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, rotation_matrices, rotations_about
+from ._scene import COLOURS, Clock
+
+TABLE = BOX_SCENES["scoop_3d"]
+
+BALLS = 40
+"""Balls in the reservoir (paper)."""
+WANTED = (1, 7)
+"""Fewest and most balls that are wanted (paper)."""
+
+HALF_THICKNESS = TABLE.box_dimensions_min[1]
+"""Of a plate, m (paper, table of scoop 3D; we read its box dimensions as half extents, as PyBullet does)."""
+HANDLE_HALF_EXTENTS = (0.01, HALF_THICKNESS, 0.1)
+"""Of the handle, m (ours)."""
+HANDLE_LEAN = np.deg2rad(30.0)
+"""The handle leans outwards by this from the back plate, rad (ours): it never passes over the opening."""
+
+BALL_RADIUS = 0.029
+"""m (ours): tools hold 1 ball to 15."""
+BALL_MASS = 0.05
+"""kg (ours)."""
+FRICTION = 0.3
+"""Of balls, plates, walls and floor; PyBullet multiplies the frictions of a contact's two bodies, so a contact's is
+0.09 (ours): slippery balls do not pile up beyond the rim."""
+LINEAR_DAMPING = 0.1
+"""Share of its speed that a ball loses in a second (ours)."""
+ANGULAR_DAMPING = 0.5
+"""Share of its spin that a ball loses in a second (ours)."""
+RESERVOIR = (0.22, 0.255)
+"""Half the inner size of the reservoir along x and y, m (ours): a ball passes between any tool and a wall."""
+WALL_HEIGHT = 0.1
+"""m (ours)."""
+WALL_HALF_THICKNESS = 0.01
+"""m (ours)."""
+FLOOR_PICTURE = (1.0, 1.0, 0.01)
+"""Half extents of what is drawn of the endless floor, m (ours)."""
+FLOOR_COLOUR = "#e4e6ea"
+"""What the floor is drawn in (ours)."""
+LINE = 0.13
+"""A tool that is nowhere lower than this is clear of the reservoir, m (ours)."""
+
+FLOOR_CLEARANCE = 0.004
+"""Between floor and bottom plate at the start, and least ever, m (ours)."""
+TOOL_START = (TABLE.tool_position_init[0], TABLE.tool_position_init[1], FLOOR_CLEARANCE + HALF_THICKNESS)
+"""Where the middle of the bottom plate starts, m: x and y are the paper's; the paper's z of 0.1 m is above the balls,
+ours is among them."""
+REACH = (0.03, 0.03)
+"""The tool moves no further than this from its start along x and y, m (ours)."""
+HIGHEST = 0.2
+"""Highest place of the middle of the bottom plate, m (ours)."""
+LARGEST_TURN = (0.25, 0.25, 0.3)
+"""Largest turns about x, y and z, rad (ours): the tool cannot be tipped out, so that its shape decides the count."""
+CONTROL_SCALE = 0.015
+"""From the paper's control bounds to a change of pose in a control step, m and rad (ours): 0.45 m/s and 0.71 rad/s. The
+paper's 0.05 would be 1.5 m/s and 2.4 rad/s, at which balls are thrown about."""
+
+POUR_COLUMNS = 3
+"""Balls that lie where the tool will are poured on it in layers of this many by this many (ours)."""
+POUR_GAP = 0.004
+"""Between balls before they are poured, m (ours)."""
+SETTLING_STEPS = 16
+"""Control steps for which poured balls come to rest before the first control (ours)."""
+
+HELD_SPEED = 0.5
+"""A held ball moves no faster than this in the frame of the tool, m/s (ours)."""
+HELD_STEPS = 6
+"""Control steps in a row for which the wanted number must be held (ours)."""
+LOST_STEPS = 30
+"""Control steps that a tool may be clear of the reservoir without success (ours)."""
+PROGRESS_REWARD = 5.0
+"""Scale of the potential (ours); success earns the paper's 10."""
+CLOSENESS_POWER = 1.5
+"""How much a wrong count costs (ours)."""
+
+CLOCK = Clock(steps=4, period=1.0 / 120.0)
+"""Four physics steps per control step (ours; the paper has ten), s."""
+
+SIDES = ("back", "front", "left", "right")
+OUTWARDS = np.array([[0.0, -1.0], [0.0, 1.0], [-1.0, 0.0], [1.0, 0.0]])
+"""(P, 2) where the side plates stand, seen from the middle of the bottom plate."""
+
+
+def _ball_picture(rings: int = 6, columns: int = 9) -> tuple[list[list[float]], list[int]]:
+    """Return points and triangles of a coarse ball; PyBullet's own, a fine one, takes 0.3 ms a ball to make."""
+    tilt, turn = np.meshgrid(np.linspace(0.0, np.pi, rings), np.linspace(0.0, 2.0 * np.pi, columns), indexing="ij")
+    points = np.stack([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)], axis=-1)
+    corner = (np.arange(rings - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    upper = np.stack([corner, corner + columns, corner + 1], axis=1)
+    lower = np.stack([corner + 1, corner + columns, corner + columns + 1], axis=1)
+    return (BALL_RADIUS * points.reshape(-1, 3)).tolist(), np.concatenate([upper, lower]).ravel().tolist()
+
+
+BALL_PICTURE = _ball_picture()
+"""Points (m) and triangles of what is drawn for a ball."""
+
+
+class Scoop3D(Task):
+    """Scoop as many balls out of a reservoir of 40 as are wanted (paper, appendix "Environment Details").
+
+    The tool is a scoop of six links: a rectangular bottom plate, a plate on each of its four sides, and a handle on the
+    back one. It starts on the floor of the reservoir, among the balls and filled to overflowing with those that lay
+    there; what does not fit rolls off on the way up. The tool can be turned only a little, so that the room between
+    its plates decides how many balls come along, and every number wants a tool of its own.
+
+    Action space
+        Design, 10: width and length of the bottom plate, 0.08 to 0.16 m, heights of the back, front, left and right
+        plates, 0.04 to 0.1 m, and how far each leans outwards, +-15 degrees (paper, table of 3D scoop, read as half
+        extents). Plates are 0.01 m thick (paper). Control, 6: change of the tool's pose in a control step, 0.015 times
+        +-1 along x, y and z and 0.015 times +-1.57 about x, y and z (bounds the paper's, scale ours, m and rad our
+        reading); turns stay within 0.25, 0.25 and 0.3 rad (ours).
+
+    Observation
+        | index | what | unit | range |
+        | --- | --- | --- | --- |
+        | 0 to 2 | middle of the bottom plate x, y, z | m | -0.1 .. 0.1, -0.1 .. 0.2 and -0.1 .. 0.3 |
+        | 3 to 5 | turns about x, y, z | rad | -0.5 .. 0.5 |
+        | 6 | from the bottom plate's lowest point up to the line | m | -0.3 .. 0.3 |
+        | 7 | balls in or above the tool | balls | 0 .. 40 |
+        | 8 | balls held above the line | balls | 0 .. 40 |
+        | 9 | balls wanted less those in or above the tool | balls | -40 .. 40 |
+        | 10 | control steps for which the wanted number has been held, of 6 | 1 | 0 .. 1 |
+        | 11 | control steps for which the tool has been clear, of 30 | 1 | 0 .. 1 |
+        | 12, 13 | mean place of the balls in or above the tool, in its frame, x, y | m | -0.2 .. 0.2 |
+        | 14 | highest of them above the bottom plate | m | 0 .. 0.5 |
+        | 15 to 21 | whether 1, 2, ... 7 balls are wanted | 1 | 0 .. 1 |
+        | 22 | balls wanted | balls | 1 .. 7 |
+
+        followed by the design (10, normalised) and the phase (3).
+
+    Design space
+        `Scoop3D.design_space`.
+
+    Goal space
+        Whole numbers of balls from 1 to 7 (paper), all alike. The pile differs between episodes, too: how the balls
+        lie and how they are poured on the tool; policies are not told.
+
+    Reward
+        The change of 5 h c in every control step, - 0.001 per control step, + 10 on success (paper, table of 3D scoop).
+        h: share of the way from the start to the line that the bottom plate's lowest point has been lifted, 0 to 1.
+        c = (min(k + 1, n + 1) / max(k + 1, n + 1))^1.5 with k balls in or above the tool and n wanted. The potential
+        starts at 0 whatever the tool; an episode's return lies below 15.
+
+    Starting state
+        The middle of the bottom plate is at (0, 0.05) (paper), 0.004 m above the floor (ours; the paper's height
+        of 0.1 m is above the balls). Balls that would touch the tool are poured on it from above, then all come to rest
+        for 16 control steps before the episode starts (ours).
+
+    Episode end
+        Success: the tool is clear, its bottom plate nowhere lower than 0.13 m, and exactly the wanted number of balls
+        is held for 6 control steps in a row. Held: between the side plates, above the bottom plate, and slower than
+        0.5 m/s in the tool's frame. Failure: the tool has been clear for 30 control steps without success. Time limit:
+        100 control steps (paper) of 1/30 s.
+    """
+
+    name = "scoop_3d"
+    title = "Scoop (3D)"
+    horizon = TABLE.max_episode_steps
+    control_period = CLOCK.control_period
+    design_space = Box.of(
+        bottom_width=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
+        bottom_length=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
+        **{
+            f"{side}_height": (2.0 * TABLE.box_dimensions_min[2], 2.0 * TABLE.box_dimensions_max[2], "m")
+            for side in SIDES
+        },
+        **{
+            f"{side}_angle": (
+                float(np.deg2rad(TABLE.tool_angle_min[0])),
+                float(np.deg2rad(TABLE.tool_angle_max[0])),
+                "rad",
+            )
+            for side in SIDES
+        },
+    )
+    tool_graph = ToolGraph(
+        num_nodes=6, edges=((0, 1), (1, 2), (2, 3), (2, 4), (2, 5)), parameter_nodes=(2, 2, 1, 3, 4, 5, 1, 3, 4, 5)
+    )
+    control_space = Box(
+        names=("move_x", "move_y", "move_z", "turn_x", "turn_y", "turn_z"),
+        low=tuple(CONTROL_SCALE * bound for bound in TABLE.control_action_min),
+        high=tuple(CONTROL_SCALE * bound for bound in TABLE.control_action_max),
+        units=("m", "m", "m", "rad", "rad", "rad"),
+    )
+    instance_space = Box.of(balls_wanted=(float(WANTED[0]), float(WANTED[1]), "balls"), pile=(0.0, 2.0**20 - 1.0, "1"))
+    goal_size = 1
+    state_space = Box.of(
+        tool_x=(-0.1, 0.1, "m"),
+        tool_y=(-0.1, 0.2, "m"),
+        tool_z=(-0.1, 0.3, "m"),
+        turn_x=(-0.5, 0.5, "rad"),
+        turn_y=(-0.5, 0.5, "rad"),
+        turn_z=(-0.5, 0.5, "rad"),
+        way_to_line=(-0.3, 0.3, "m"),
+        balls_above=(0.0, BALLS, "balls"),
+        balls_held=(0.0, BALLS, "balls"),
+        balls_missing=(-BALLS, BALLS, "balls"),
+        held_share=(0.0, 1.0, "1"),
+        clear_share=(0.0, 1.0, "1"),
+        centre_x=(-0.2, 0.2, "m"),
+        centre_y=(-0.2, 0.2, "m"),
+        highest_ball=(0.0, 0.5, "m"),
+        **{f"wants_{count}": (0.0, 1.0, "1") for count in range(WANTED[0], WANTED[1] + 1)},
+    )
+    outcome = Quantity("balls held above the line", "balls")
+    max_slots = MAX_SLOTS
+    # Rolling balls overlap for a step when they meet, also right after they were poured; tools start clear of all.
+    soundness = Soundness(
+        overlap=0.5 * BALL_RADIUS, speed=4.0, outcome_change=0.5, start_overlap=0.25 * BALL_RADIUS, chaotic=True
+    )
+
+    def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
+        """Return (count, I) random whole numbers of balls and piles."""
+        wanted = rng.integers(WANTED[0], WANTED[1], size=count, endpoint=True)
+        piles = rng.integers(0, int(self.instance_space.high[1]), size=count, endpoint=True)
+        return np.stack([wanted, piles], axis=1).astype(np.float64)
+
+    def material(self, designs: Floats) -> Floats:
+        """Return the area of the plates over the largest one for designs (b, D) in their units."""
+        largest = _area(np.array([self.design_space.high]))
+        share: Floats = _area(designs) / largest
+        return share
+
+    def effort(self, controls: Floats) -> Floats:
+        """Return the share of the largest change of pose for controls (b, C) in [-1, 1]."""
+        change: Floats = np.linalg.norm(controls, axis=1) / np.sqrt(controls.shape[1])
+        return change
+
+    def script(self) -> Behaviour:
+        """Return a script that lifts straight up and holds still."""
+        return _Script(self)
+
+    def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
+        """Return a simulator of `num_slots` reservoirs."""
+        return _ScoopSimulator(num_slots, self.state_space.size, CLOCK.refined(refinement), SETTLING_STEPS)
+
+
+class _ScoopSimulator(BulletSimulator):
+    """A reservoir of rigid balls and a scoop on a gantry with six joints, one of each per slot."""
+
+    camera = Camera(eye=(0.75, -0.75, 0.65), target=(0.0, 0.03, 0.08), field_of_view=40.0)
+    room = ((-3.0, 3.0), (-3.0, 3.0), (0.0, 0.6))
+    turning_axes = (0, 1, 2)
+    push_force = 20.0
+    turn_torque = 2.0
+    tool_mass = 0.2
+    contact_correction = 0.5
+    tool_friction = FRICTION
+    solver_iterations = 10
+
+    def __init__(self, num_slots: int, state_size: int, clock: Clock, settling_steps: int) -> None:
+        super().__init__(num_slots, state_size, num_bodies=BALLS, clock=clock)
+        self.settling_steps = settling_steps
+        self.wanted = np.zeros(num_slots, dtype=np.intp)
+        self.piles: list[np.random.Generator] = [np.random.default_rng(0)] * num_slots
+        self.designs = np.zeros((num_slots, Scoop3D.design_space.size))
+        self.local = np.zeros((num_slots, BALLS, 3))
+        """(B, N, 3) balls in the frame of the tool."""
+        self.potential = np.zeros(num_slots)
+        self.held_steps = np.zeros(num_slots, dtype=np.intp)
+        self.clear_steps = np.zeros(num_slots, dtype=np.intp)
+
+    def begin(self, slots: Slots, instances: Floats) -> None:
+        """Fill the reservoirs with the piles of `instances` (b, I)."""
+        self.wanted[slots] = np.rint(instances[:, 0]).astype(np.intp)
+        for slot, pile in zip(slots.tolist(), instances[:, 1].tolist(), strict=True):
+            self.piles[slot] = np.random.default_rng(round(pile))
+        self.restart(slots)
+        for values in (self.potential, self.held_steps, self.clear_steps, self.reward, self.outcome):
+            values[slots] = 0
+        self.success[slots] = self.failure[slots] = False
+        self.state[slots] = 0.0
+        self.state[slots, 0:3] = TOOL_START
+        self.state[slots, 9] = self.wanted[slots]
+        self.state[slots, 15:] = np.arange(WANTED[0], WANTED[1] + 1) == self.wanted[slots, None]
+
+    def build_scene(self, slot: int) -> list[int]:
+        """Build floor and walls, and lay the balls on the floor side by side."""
+        world = self.worlds[slot]
+        floor = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=world)
+        slab = pybullet.createVisualShape(
+            pybullet.GEOM_BOX,
+            halfExtents=FLOOR_PICTURE,
+            visualFramePosition=(0, 0, -FLOOR_PICTURE[2]),
+            physicsClientId=world,
+        )
+        self._add_rigid(slot, floor, [[0.0, 0.0, 0.0]], picture=slab, colour=FLOOR_COLOUR)
+        (x, y), thick, middle = RESERVOIR, WALL_HALF_THICKNESS, 0.5 * WALL_HEIGHT
+        for size, offset in (
+            ((thick, y + 2.0 * thick, middle), (x + thick, 0.0)),
+            ((x, thick, middle), (0.0, y + thick)),
+        ):
+            shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=size, physicsClientId=world)
+            self._add_rigid(slot, shape, [[sign * offset[0], sign * offset[1], middle] for sign in (-1.0, 1.0)])
+        shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=BALL_RADIUS, physicsClientId=world)
+        points, triangles = BALL_PICTURE
+        picture = pybullet.createVisualShape(
+            pybullet.GEOM_MESH, vertices=points, indices=triangles, normals=points, physicsClientId=world
+        )
+        return self._add_rigid(slot, shape, lay_balls(self.piles[slot]).tolist(), BALL_MASS, picture, COLOURS["object"])
+
+    def _add_rigid(
+        self,
+        slot: int,
+        shape: int,
+        positions: list[list[float]],
+        mass: float = 0.0,
+        picture: int = -1,
+        colour: str = COLOURS["scene"],
+    ) -> list[int]:
+        """Add rigid bodies of one shape; a world of these steps in half the time that one of multi-bodies takes."""
+        world = self.worlds[slot]
+        bodies: list[int] = list(
+            pybullet.createMultiBody(
+                mass, shape, picture, useMaximalCoordinates=1, batchPositions=positions, physicsClientId=world
+            )
+        )
+        for body in bodies:
+            pybullet.changeDynamics(
+                body,
+                -1,
+                lateralFriction=FRICTION,
+                restitution=0.0,
+                linearDamping=LINEAR_DAMPING,
+                angularDamping=ANGULAR_DAMPING,
+                physicsClientId=world,
+            )
+            self.paint(slot, body, colour)
+        return bodies
+
+    def build(self, slots: Slots, designs: Floats) -> None:
+        """Put the tools `designs` (b, D) on the floor and pour the balls that lay there on them."""
+        self.designs[slots] = designs
+        for slot, design in zip(slots.tolist(), designs, strict=True):
+            balls, world = self.bodies[slot, :, :3], self.worlds[slot]
+            inside = np.flatnonzero(touching(design, balls - TOOL_START))
+            for ball, place in zip(inside.tolist(), pour(design, len(inside), self.piles[slot]).tolist(), strict=True):
+                pybullet.resetBasePositionAndOrientation(self.moving[slot][ball], place, LEVEL, physicsClientId=world)
+        start = np.tile([*TOOL_START, 0.0, 0.0, 0.0], (len(slots), 1))
+        self.add_tools(slots, scoop_boxes(designs), start)
+        self.drive(slots, np.zeros((len(slots), 6)))
+        for _ in range(self.settling_steps):
+            self.advance(slots)
+        self._observe(slots)
+        self._observe(slots)  # Twice: balls that rest in the tool are slow.
+        self.potential[slots] = 0.0
+
+    def step(self, slots: Slots, controls: Floats) -> None:
+        """Change the tools' poses by `controls` (b, C) and reward balls lifted."""
+        self.drive(slots, self._displacements(slots, controls))
+        self.advance(slots)
+        above, held, clear, raised = self._observe(slots)
+        self.clear_steps[slots] += clear
+        right = clear & (held == self.wanted[slots]) & (above == held)
+        self.held_steps[slots] = np.where(right, self.held_steps[slots] + 1, 0)
+        self.success[slots] = success = self.held_steps[slots] >= HELD_STEPS
+        self.failure[slots] = ~success & (self.clear_steps[slots] >= LOST_STEPS)
+        potential = PROGRESS_REWARD * raised * closeness(above, self.wanted[slots])
+        progress = potential - self.potential[slots]
+        self.reward[slots] = progress + TABLE.slack_reward + TABLE.success_reward * success
+        self.potential[slots] = potential
+        self.outcome[slots] = held
+        self.state[slots, 10] = self.held_steps[slots] / HELD_STEPS
+        self.state[slots, 11] = self.clear_steps[slots] / LOST_STEPS
+
+    def inspect(self, slot: int) -> Physics:
+        """Return deepest overlap, fastest ball and whether all balls are in the room; balls by their distances."""
+        world, tool, balls = self.worlds[slot], self._tool(slot), self.bodies[slot, :, :3]
+        apart = np.linalg.norm(balls[:, None] - balls, axis=2) + 2.0 * BALL_RADIUS * np.eye(BALLS)
+        others = {pybullet.getBodyUniqueId(index, world) for index in range(pybullet.getNumBodies(world))}
+        others |= set(self.moving[slot])
+        contacts = (
+            point
+            for other in sorted(others - {tool})
+            for point in pybullet.getClosestPoints(tool, other, 0.0, physicsClientId=world)
+        )
+        beyond = np.abs(balls[:, :2]) + BALL_RADIUS - RESERVOIR
+        low_inside: Booleans = (beyond.max(axis=1) < BALL_RADIUS) & (balls[:, 2] < WALL_HEIGHT)
+        low, high = np.array(self.room).T
+        return Physics(
+            overlap=max(
+                2.0 * BALL_RADIUS - float(apart.min()),
+                BALL_RADIUS - float(balls[:, 2].min()),
+                float(beyond[low_inside].max(initial=0.0)),
+                *(-point[8] for point in contacts),
+                0.0,
+            ),
+            speed=float(np.linalg.norm(self.bodies[slot, :, 7:10], axis=1).max()),
+            contained=bool(((balls >= low) & (balls <= high)).all()),
+        )
+
+    def mark(self, slot: int, marks: Marks) -> None:
+        """Draw the line around the reservoir, and a dot on it for every ball wanted, filled for every ball held."""
+        x, y = RESERVOIR
+        corners = np.array([(x, y), (-x, y), (-x, -y), (x, -y), (x, y)])
+        marks.line(np.pad(corners, ((0, 0), (0, 1)), constant_values=LINE), COLOURS["goal"])
+        count = max(int(self.wanted[slot]), int(self.outcome[slot]))
+        for place, share in enumerate(np.linspace(-0.9, 0.9, 10)[:count]):
+            dot = np.array([x * share, -y, LINE])
+            marks.dot(dot, COLOURS["goal" if place < self.wanted[slot] else "scene"], radius=7)
+            marks.dot(dot, COLOURS["object" if place < self.outcome[slot] else "background"], radius=4)
+
+    def _displacements(self, slots: Slots, controls: Floats) -> Floats:
+        """Return the (b, 6) changes of pose that `controls` (b, C) ask for, within the limits."""
+        pose = self.pose[slots]
+        target = pose + controls * Scoop3D.control_space.bounds[1]
+        for axis in (0, 1):
+            target[:, axis] = np.clip(target[:, axis], TOOL_START[axis] - REACH[axis], TOOL_START[axis] + REACH[axis])
+        target[:, 3:] = np.clip(target[:, 3:], -np.array(LARGEST_TURN), LARGEST_TURN)
+        lowest = FLOOR_CLEARANCE + drop(self.designs[slots], turn_matrices(target[:, 3:]))
+        target[:, 2] = np.clip(target[:, 2], lowest, HIGHEST)
+        displacement: Floats = target - pose
+        return displacement
+
+    def _observe(self, slots: Slots) -> tuple[Floats, Floats, Booleans, Floats]:
+        """Read the worlds; return balls above and held, whether the tools are clear, and the share of the way up."""
+        pose, balls = self.read_tools(slots), self.read_bodies(slots)[:, :, :3]
+        matrices = turn_matrices(pose[:, 3:])
+        local = (balls - pose[:, None, :3]) @ matrices
+        slow = np.linalg.norm(local - self.local[slots], axis=2) < HELD_SPEED * self.clock.control_period
+        self.local[slots] = local
+        over = above_bottom(self.designs[slots], local)
+        lowest = pose[:, 2] - drop(self.designs[slots], matrices)
+        clear = lowest > LINE
+        above = over.sum(axis=1)
+        held = (over & slow).sum(axis=1) * clear
+        way = LINE - lowest
+        state = self.state
+        state[slots, 0:6] = pose
+        state[slots, 6] = way
+        state[slots, 7] = above
+        state[slots, 8] = held
+        state[slots, 9] = self.wanted[slots] - above
+        some = np.maximum(above, 1)[:, None]
+        state[slots, 12:14] = (local[:, :, :2] * over[:, :, None]).sum(axis=1) / some
+        state[slots, 14] = (local[:, :, 2] * over).max(axis=1)
+        raised = np.clip(1.0 - way / (LINE - FLOOR_CLEARANCE), 0.0, 1.0)
+        return above, held, clear, raised
+
+
+def lay_balls(rng: np.random.Generator) -> Floats:
+    """Return the (N, 3) places of balls that lie on the floor side by side, each anywhere in a cell of its own."""
+    columns = int(RESERVOIR[0] / BALL_RADIUS)
+    rows = -(-BALLS // columns)
+    cell = np.array([2.0 * RESERVOIR[0] / columns, 2.0 * RESERVOIR[1] / rows])
+    cells = rng.permutation(columns * rows)[:BALLS]
+    middle = (np.stack([cells % columns, cells // columns], axis=1) + 0.5) * cell - RESERVOIR
+    places = np.full((BALLS, 3), BALL_RADIUS)
+    places[:, :2] = middle + rng.uniform(-0.95, 0.95, size=(BALLS, 2)) * (0.5 * cell - BALL_RADIUS)
+    return places
+
+
+def pour(design: Floats, count: int, rng: np.random.Generator) -> Floats:
+    """Return (count, 3) places above the tool `design` (D,) at its start, in layers, clear of it and of each other."""
+    pitch = 2.0 * BALL_RADIUS + POUR_GAP
+    layer, row, column = np.unravel_index(np.arange(count), (BALLS, POUR_COLUMNS, POUR_COLUMNS))
+    angles, heights = design[6:], design[2:6]
+    back = -0.5 * design[1] + max(0.0, -np.sin(angles[0]) * heights[0]) + BALL_RADIUS + 0.5 * POUR_GAP
+    first = max(back, -pitch)
+    jitter = rng.uniform(-0.45, 0.45, size=(count, 2)) * POUR_GAP
+    shift = rng.uniform((-0.02, 0.0), (0.02, 0.015))
+    top = (heights * np.cos(angles)).max() - HALF_THICKNESS
+    x = (column - 0.5 * (POUR_COLUMNS - 1)) * pitch + jitter[:, 0] + shift[0]
+    y = first + row * pitch + jitter[:, 1] + shift[1]
+    lowest = max(top + BALL_RADIUS + 2.0 * HALF_THICKNESS, BALL_RADIUS + pitch - TOOL_START[2])  # Above balls outside.
+    z = lowest + layer * pitch
+    return TOOL_START + np.stack([x, y, z], axis=1)
+
+
+def scoop_boxes(designs: Floats) -> Boxes:
+    """Return the boxes of tools (b, D) in their own frame: handle, back, bottom, front, left and right plates."""
+    count = len(designs)
+    half, heights, angles = 0.5 * designs[:, :2], 0.5 * designs[:, 2:6], designs[:, 6:]
+    sizes = np.zeros((count, 6, 3))
+    centres, rotations = np.zeros((count, 6, 3)), np.zeros((count, 6, 4))
+    rotations[:, 2, 3] = 1.0
+    sizes[:, 2] = np.stack([*half.T, np.full(count, HALF_THICKNESS)], axis=1)
+    for side, node in enumerate((1, 3, 4, 5)):
+        axis = int(np.argmax(np.abs(OUTWARDS[side])))
+        height, angle = heights[:, side], angles[:, side]
+        out = half[:, axis] + HALF_THICKNESS * np.cos(angle) + height * np.sin(angle)
+        centres[:, node, axis] = OUTWARDS[side, axis] * out
+        centres[:, node, 2] = height * np.cos(angle) - HALF_THICKNESS * (1.0 + np.sin(angle))
+        sizes[:, node, axis] = HALF_THICKNESS
+        sizes[:, node, 1 - axis] = half[:, 1 - axis]
+        sizes[:, node, 2] = height
+        sign = OUTWARDS[side, axis] * (1.0 if axis == 0 else -1.0)
+        rotations[:, node] = rotations_about(1 - axis, sign * angle)
+    lean = angles[:, 0] + HANDLE_LEAN
+    sizes[:, 0] = HANDLE_HALF_EXTENTS
+    out = half[:, 1] + HALF_THICKNESS * np.cos(angles[:, 0]) + 2.0 * heights[:, 0] * np.sin(angles[:, 0])
+    up = 2.0 * heights[:, 0] * np.cos(angles[:, 0]) - HALF_THICKNESS * (1.0 + np.sin(angles[:, 0]))
+    centres[:, 0, 1] = -out - HANDLE_HALF_EXTENTS[2] * np.sin(lean)
+    centres[:, 0, 2] = up + HANDLE_HALF_EXTENTS[2] * np.cos(lean)
+    rotations[:, 0] = rotations_about(0, lean)
+    return Boxes(sizes, centres, rotations)
+
+
+def beyond_sides(designs: Floats, points: Floats) -> Floats:
+    """Return how far `points` (b, n, 3), in the frame of tools (b, D), lie outside each inner face: (b, n, P)."""
+    half = 0.5 * designs[:, [1, 1, 0, 0]][:, None]
+    angles = designs[:, None, 6:]
+    out = points[..., :2] @ OUTWARDS.T - half
+    result: Floats = out * np.cos(angles) - (points[..., 2:] + HALF_THICKNESS) * np.sin(angles)
+    return result
+
+
+def above_bottom(designs: Floats, points: Floats) -> Booleans:
+    """Tell which `points` (b, n, 3), in the frame of tools (b, D), are above the bottom and between the sides."""
+    inside: Booleans = (beyond_sides(designs, points) < 2.0 * HALF_THICKNESS).all(axis=2) & (points[..., 2] > 0.0)
+    return inside
+
+
+def touching(design: Floats, balls: Floats) -> Booleans:
+    """Tell which `balls` (N, 3) would touch the tool `design` (D,) or lie inside it."""
+    beyond = beyond_sides(design[None], balls[None])[0]
+    near: Booleans = (beyond < 2.0 * HALF_THICKNESS + BALL_RADIUS + POUR_GAP).all(axis=1)
+    return near
+
+
+def turn_matrices(turns: Floats) -> Floats:
+    """Return the (b, 3, 3) rotations of `turns` (b, 3) about x, then y, then z, each about the turned axis."""
+    about_x, about_y, about_z = (rotation_matrices(rotations_about(axis, turns[:, axis])) for axis in range(3))
+    result: Floats = about_x @ about_y @ about_z
+    return result
+
+
+def drop(designs: Floats, matrices: Floats) -> Floats:
+    """Return how far the lowest point of the bottom plates lies below their middle, (b,), m."""
+    half = np.column_stack([0.5 * designs[:, :2], np.full(len(designs), HALF_THICKNESS)])
+    result: Floats = (np.abs(matrices[:, 2]) * half).sum(axis=1)
+    return result
+
+
+def closeness(count: Floats, wanted: Slots) -> Floats:
+    """Return 1 for the wanted count and less the further the ratio of count and wanted is from 1."""
+    few, many = np.minimum(count, wanted) + 1.0, np.maximum(count, wanted) + 1.0
+    result: Floats = (few / many) ** CLOSENESS_POWER
+    return result
+
+
+def _area(designs: Floats) -> Floats:
+    width, length = designs[:, 0], designs[:, 1]
+    back, front, left, right = designs[:, 2:6].T
+    result: Floats = width * length + width * (back + front) + length * (left + right)
+    return result
+
+
+class _Script(Behaviour):
+    """A tool for each number of balls, lifted straight up and held still."""
+
+    TOOLS: ClassVar[tuple[tuple[float, ...], ...]] = (
+        (-0.9, -0.9, -0.3, -0.4, -0.8, -0.7, -0.3, 0.3, -0.3, -0.2),  # 1: the smallest plate
+        (0.2, -0.9, -0.1, -0.2, -0.5, -0.6, -0.2, 0.6, -0.2, -0.3),  # 2: wider than long
+        (0.8, -1.0, -0.1, -0.7, -0.1, -0.3, 0.6, 0.9, 0.7, 0.6),  # 3: wide, short and open
+        (0.4, 0.5, -0.7, -0.7, -0.7, -0.7, -0.2, -0.2, -0.2, -0.2),  # 4: square and low
+        (0.9, 0.1, -0.2, -0.9, -0.1, 0.1, -0.5, 0.4, -0.2, -0.2),  # 5: wide, low in front
+        (0.9, 0.5, -0.1, -0.2, -0.2, -0.2, 0.5, 0.4, 0.1, 0.1),  # 6: large
+        (1.0, 0.4, 0.2, -0.2, -0.6, -0.4, 0.6, 0.8, 0.9, -0.5),  # 7: large and open
+    )
+    """Normalised designs for 1 to 7 balls, found by a small search over tools lifted straight up."""
+    SPARE_HEIGHT = 0.03
+    """The tool is lifted this far above the line, m."""
+
+    def __init__(self, task: Scoop3D) -> None:
+        self.task = task
+
+    def design(self, observation: Singles) -> Singles:
+        """Return the tool for the number of balls wanted."""
+        wanted = np.rint(observation[..., self.task.layout.goal][..., 0]).astype(np.intp)
+        tools: Singles = np.array(self.TOOLS, dtype=np.float32)[wanted - WANTED[0]]
+        return tools
+
+    def act(self, observation: Singles) -> Singles:
+        """Return the control that lifts the tool and keeps it level."""
+        largest = self.task.control_space.bounds[1]
+        control = np.zeros((*observation.shape[:-1], self.task.control_space.size), dtype=np.float32)
+        control[..., 2] = (observation[..., 6] + self.SPARE_HEIGHT) / largest[2]
+        control[..., 3:] = -observation[..., 3:6] / largest[3:]
+        return np.clip(control, -1.0, 1.0)

@@ -1,0 +1,339 @@
+"""Scoop against its documentation: geometry, piles, what counts as held, reward, and what a gentle hand may do.
+
+Nothing here depends on a tuned number: all of them are read from the task's module. Lengths are in m, times in s.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pymunk
+import pytest
+
+from codesign_bench.episodes import Episodes
+from codesign_bench.evaluate import evaluate
+from codesign_bench.registry import load_module
+from codesign_bench.task import Behaviour, Floats, Singles, load_task
+
+scoop: Any = load_module("tasks", "scoop")
+SLOT = np.array([0])
+IDLE = np.zeros((1, 3))
+TRAY = np.array([[0.0, 1.0, 1.0, 1.0, -0.75]])
+"""A ladle, normalised, whose second and third link make one long tray that rises by 3 degrees: less than balls need."""
+SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
+"""A title in the docstring and the indented text below it."""
+
+
+def instance(wanted: int, pile: int = 0, shift: float = 0.0) -> Floats:
+    """Return an instance (1, 3)."""
+    return np.array([[wanted, pile, shift]], dtype=np.float64)
+
+
+def started(instances: Floats, designs: Floats) -> Episodes:
+    """Return episodes right after the design step; `designs` (b, D) are normalised."""
+    slots = np.arange(len(instances))
+    episodes = Episodes(load_task("scoop"), len(instances))
+    episodes.begin(slots, instances)
+    episodes.design(slots, designs)
+    return episodes
+
+
+def many_designs(count: int) -> Floats:
+    """Return all corners of the design space and `count` designs inside, normalised."""
+    space = load_task("scoop").design_space
+    inside = np.random.default_rng(7).uniform(-1.0, 1.0, size=(count, space.size))
+    return np.vstack([list(product((-1.0, 1.0), repeat=space.size)), inside])
+
+
+def tray_at(height: float, wanted: int, balls: int) -> Episodes:
+    """Return an episode whose tray's lowest point has been put at `height`, with so many balls at rest on it."""
+    episodes = started(instance(wanted), TRAY)
+    simulator: Any = episodes.simulator
+    tool, chain = simulator.tools[0], simulator.chain[0]
+    tool.position = (scoop.TOOL_START[0], height - chain[:, 1].min())
+    simulator.bodies[0, scoop.NUM_BALLS, :2] = tool.position
+    along = (chain[3] - chain[1]) / np.linalg.norm(chain[3] - chain[1])
+    across = np.array([-along[1], along[0]]) * (scoop.BALL_RADIUS + scoop.LINK_HALF_WIDTH)
+    for index, ball in enumerate(simulator.balls[0].bodies):
+        if index < balls:
+            ball.position = tuple(np.array(tool.position) + (1.0 + 1.3 * index) * along + across)
+        else:  # The others make no difference: in two layers beside the reservoir.
+            ball.position = (scoop.YARD[0] + 1.0, scoop.FLOOR + 1.0 + 1.3 * index)
+    return episodes
+
+
+def idle(episodes: Episodes, steps: int) -> list[bool]:
+    """Leave the hand still for so many control steps; return whether each ended in success."""
+    results = []
+    for _ in range(steps):
+        episodes.simulator.step(SLOT, IDLE)
+        results.append(bool(episodes.success(SLOT)[0]))
+    return results
+
+
+def test_the_docstring_tells_the_constants() -> None:
+    task = load_task("scoop")
+    text = inspect.cleandoc(str(task.__doc__))
+    sections = {title: " ".join(body.split()) for title, body in SECTION.findall(text)}
+    few, many = scoop.GOAL_NUMBERS
+    lengths = [f"{low:g} to {high:g} m" for low, high in zip(*task.design_space.bounds, strict=True)][:3]
+    low, high = np.rad2deg(task.design_space.bounds)[:, 3]
+    for title, numbers in {
+        "Action space": (
+            *lengths,
+            f"{low:g} to {high:g} degrees",
+            f"+-{scoop.MAX_SPEED:g} m/s",
+            f"+-{scoop.MAX_TURN:g} rad/s",
+            f"{scoop.MAX_ACCELERATION:g} m/s^2",
+            f"{scoop.MAX_TILT:g} rad",
+            f"{scoop.CLEARANCE:g} m from floor and walls",
+        ),
+        "Observation": tuple(
+            f"{task.state_space.low[index]:g} .. {task.state_space.high[index]:g} |" for index in range(14)
+        ),
+        "Goal space": (f"{few} to {many} balls of {scoop.NUM_BALLS}",),
+        "Reward": (
+            f"^{scoop.NUMBER_EXPONENT:g}",
+            f"{-scoop.TABLE.slack_reward:g} per control step",
+            f"from y = {scoop.TOOL_START[1]:g} m to {scoop.CEILING:g} m",
+            f"+{scoop.SUCCESS_REWARD:g} on success",
+        ),
+        "Starting state": (
+            f"{scoop.NUM_PILES} piles",
+            f"x = {scoop.TOOL_START[0]:g} m (paper) +-{scoop.START_SHIFT:g} m",
+            f"y = {scoop.TOOL_START[1]:g} m",
+            f"{scoop.TOOL_START[1] - scoop.FLOOR:g} m above the floor",
+        ),
+        "Episode end": (
+            f"{scoop.HELD_STEPS} control steps",
+            f"y = {scoop.CLEAR:g} m",
+            f"{scoop.REST_SPEED:g} m/s",
+            f"{task.horizon} control steps of 1/{1.0 / task.control_period:g} s",
+        ),
+    }.items():
+        assert [number for number in numbers if number not in sections[title]] == [], title
+
+
+def test_balls_above_a_ladle_by_hand() -> None:
+    ladle = np.array([[[-1.0, 2.0], [0.0, 0.0], [2.0, 0.0], [3.0, 1.0]]])
+    places = {
+        (1.0, 0.7): True,  # on the bottom
+        (1.0, 9.0): True,  # far above it
+        (1.0, -0.7): False,  # below it
+        (2.5, 0.7): True,  # on the rising link, which is at 0.5 there
+        (2.5, 0.3): False,  # below the rising link
+        (-0.5, 1.5): True,  # on the handle, which is at 1 there
+        (-0.5, 0.5): False,  # below the handle
+        (3.1, 5.0): False,  # beyond the tip
+        (-1.1, 5.0): False,  # beyond the held end
+    }
+    answers = scoop.above(np.array([list(places)]), ladle)
+    assert answers[0].tolist() == list(places.values())
+
+
+def test_distances_from_a_chain_by_hand() -> None:
+    chain = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [4.0, 2.0]])
+    places = np.array([[1.0, 0.5], [-3.0, 4.0], [2.5, 1.0], [7.0, 6.0]])
+    np.testing.assert_allclose(scoop.distances(places, chain), [0.5, 5.0, 0.5, 5.0])
+
+
+def test_turning_points_by_hand() -> None:
+    points = np.array([[[1.0, 0.0], [0.0, 2.0]]])
+    np.testing.assert_allclose(scoop.rotated(points, np.array([0.5 * np.pi])), [[[0.0, 1.0], [-2.0, 0.0]]], atol=1e-12)
+
+
+def test_piles_are_different_nearly_at_rest_and_inside_the_reservoir() -> None:
+    piles = scoop.settled_piles()
+    assert piles.shape == (scoop.NUM_PILES, scoop.NUM_BALLS, 2)
+    assert len(np.unique(piles.reshape(scoop.NUM_PILES, -1), axis=0)) == scoop.NUM_PILES
+    left, right = scoop.RESERVOIR
+    assert piles[..., 0].min() >= left + scoop.BALL_RADIUS - 1e-6
+    assert piles[..., 0].max() <= right - scoop.BALL_RADIUS + 1e-6
+    assert piles[..., 1].min() >= scoop.FLOOR + scoop.BALL_RADIUS - 1e-6
+    assert piles[..., 1].max() <= scoop.RIM
+    for pile in piles[:4]:
+        apart = np.linalg.norm(pile[:, None] - pile, axis=2)[np.triu_indices(scoop.NUM_BALLS, 1)]
+        assert apart.min() >= 2.0 * scoop.BALL_RADIUS - 1e-6
+        space, balls = scoop.empty_reservoir(), scoop.Balls.new()
+        balls.move(None, space, pile)
+        for _ in range(30):  # One second.
+            space.step(scoop.CLOCK.period)
+        moved = np.linalg.norm([body.position for body in balls.bodies] - pile, axis=1)
+        assert np.median(moved) < 0.5 * scoop.BALL_RADIUS  # They slump a little: see `settled_piles`.
+
+
+def test_no_tool_starts_in_a_ball_and_no_ball_in_another() -> None:
+    designs, rng = many_designs(64), np.random.default_rng(1)
+    instances = load_task("scoop").sample_instances(rng, len(designs))
+    instances[:, 2] = scoop.START_SHIFT * rng.choice([-1.0, 1.0], size=len(designs))
+    simulator: Any = started(instances, designs).simulator
+    left, right = scoop.RESERVOIR
+    for slot in range(len(designs)):
+        balls, joint = simulator.bodies[slot, : scoop.NUM_BALLS, :2], simulator.bodies[slot, scoop.NUM_BALLS, :2]
+        tool = simulator.chain[slot] + joint
+        assert scoop.distances(balls, tool).min() > scoop.BALL_RADIUS + scoop.LINK_HALF_WIDTH
+        apart = np.linalg.norm(balls[:, None] - balls, axis=2)[np.triu_indices(scoop.NUM_BALLS, 1)]
+        assert apart.min() >= 2.0 * scoop.BALL_RADIUS - 1e-6
+        assert left + scoop.BALL_RADIUS <= balls[:, 0].min() + 1e-6
+        assert balls[:, 0].max() <= right - scoop.BALL_RADIUS + 1e-6
+        assert balls[:, 1].max() < scoop.LINE
+        assert tool[:, 1].min() == pytest.approx(scoop.TOOL_START[1])
+        assert joint[0] == pytest.approx(scoop.TOOL_START[0] + instances[slot, 2])
+        assert left + scoop.CLEARANCE - 1e-6 <= tool[:, 0].min()
+        assert tool[:, 0].max() <= right - scoop.CLEARANCE + 1e-6
+
+
+def test_the_hand_gains_speed_gently() -> None:
+    episodes = started(instance(3), TRAY)
+    simulator: Any = episodes.simulator
+    gain = scoop.MAX_ACCELERATION * load_task("scoop").control_period
+    for step in range(1, 6):
+        simulator.step(SLOT, np.array([[0.0, 1.0, 0.0]]))
+        np.testing.assert_allclose(simulator.hand_velocity, [[0.0, min(step * gain, scoop.MAX_SPEED)]])
+    simulator.step(SLOT, np.array([[1.0, 1.0, 0.0]]))
+    np.testing.assert_allclose(simulator.hand_velocity, [[gain, scoop.MAX_SPEED]])
+
+
+def test_tools_stay_in_their_place_whatever_is_asked() -> None:
+    designs, rng = many_designs(16), np.random.default_rng(2)
+    simulator: Any = started(load_task("scoop").sample_instances(rng, len(designs)), designs).simulator
+    left, right = scoop.RESERVOIR
+    for step in range(12):
+        if step % 4 == 0:
+            controls = rng.choice([-1.0, 1.0], size=(len(designs), 3))
+        simulator.step(np.arange(len(designs)), controls)
+        assert np.abs(simulator.hand_velocity).max() <= scoop.MAX_SPEED + 1e-6
+        points = scoop.rotated(simulator.chain, simulator.turn[:, 0]) + simulator.bodies[:, None, scoop.NUM_BALLS, :2]
+        assert np.abs(simulator.turn[:, 0]).max() <= 1.2 * scoop.MAX_TILT
+        assert points[..., 1].min() >= scoop.FLOOR + 0.5 * scoop.CLEARANCE
+        assert left + 0.5 * scoop.CLEARANCE <= points[..., 0].min()
+        assert points[..., 0].max() <= right - 0.5 * scoop.CLEARANCE
+
+
+def test_the_bodies_are_read_in_their_order() -> None:
+    episodes = started(instance(3), TRAY)
+    simulator: Any = episodes.simulator
+    simulator.step(SLOT, np.array([[0.3, 1.0, 0.2]]))
+    bodies = [*simulator.balls[0].bodies, simulator.tools[0]]
+    np.testing.assert_array_equal(simulator.bodies[0, :, :2], [body.position for body in bodies])
+    np.testing.assert_array_equal(simulator.bodies[0, :, 2:], [body.velocity for body in bodies])
+
+
+@pytest.mark.parametrize("wanted", [1, 3, 5])
+def test_the_wanted_number_at_rest_on_a_clear_tool_succeeds(wanted: int) -> None:
+    results = idle(tray_at(scoop.CLEAR + 0.2, wanted, balls=wanted), scoop.HELD_STEPS)
+    assert results == [False] * (scoop.HELD_STEPS - 1) + [True]
+
+
+@pytest.mark.parametrize("balls", [0, 2, 4])
+def test_another_number_does_not_succeed(balls: int) -> None:
+    episodes = tray_at(scoop.CLEAR + 0.2, wanted=3, balls=balls)
+    assert not any(idle(episodes, 2 * scoop.HELD_STEPS))
+    assert episodes.simulator.outcome[0] == balls
+
+
+def test_a_tool_that_is_not_clear_holds_nothing() -> None:
+    episodes = tray_at(scoop.CLEAR - 0.2, wanted=3, balls=3)
+    assert not any(idle(episodes, 2 * scoop.HELD_STEPS))
+    assert episodes.simulator.outcome[0] == 0.0
+
+
+def test_a_ball_in_motion_is_not_held_until_it_rests() -> None:
+    episodes = tray_at(scoop.CLEAR + 0.2, wanted=3, balls=3)
+    simulator: Any = episodes.simulator
+    last = simulator.balls[0].bodies[2]
+    last.position = (last.position.x, last.position.y + 1.0)  # It falls for about 0.45 s.
+    results = idle(episodes, 4 * scoop.HELD_STEPS)
+    assert not any(results[: scoop.HELD_STEPS])
+    assert any(results)
+
+
+def test_balls_rest_on_a_gentle_slope_and_slide_off_a_steep_one() -> None:
+    steepest = np.arctan(scoop.BALL_FRICTION * scoop.TOOL_FRICTION)
+    assert steepest > scoop.MAX_TILT, "tilting alone moves no ball on a level link"
+    for slope, stays in ((0.5 * steepest, True), (2.0 * steepest, False)):
+        space, balls = scoop.empty_reservoir(), scoop.Balls.new()
+        ramp = pymunk.Segment(space.static_body, (12.0, 16.0), (22.0, 16.0 + 10.0 * np.tan(slope)), 0.1)
+        ramp.friction = scoop.TOOL_FRICTION
+        space.add(ramp)
+        start = np.array([17.0, 16.0 + 5.0 * np.tan(slope)]) + 0.7 * np.array([-np.sin(slope), np.cos(slope)])
+        places = np.tile(start, (scoop.NUM_BALLS, 1))
+        places[1:] = (scoop.YARD[0] + 1.0, scoop.FLOOR + 1.0) + np.arange(1, scoop.NUM_BALLS)[:, None] * (0.0, 1.3)
+        balls.move(None, space, places)
+        for _ in range(30):  # One second.
+            space.step(scoop.CLOCK.period)
+        moved = np.linalg.norm(balls.bodies[0].position - start)
+        assert (moved < 0.1) == stays
+        if not stays:  # g (sin - mu cos) t^2 / 2, a little less for the damping.
+            free = 0.5 * scoop.GRAVITY * (np.sin(slope) - np.tan(steepest) * np.cos(slope))
+            assert 0.7 * free < moved < 1.05 * free
+
+
+def test_an_idle_tool_lifts_nothing_and_loses_nothing() -> None:
+    episodes = started(instance(3), TRAY)
+    rewards = []
+    for _ in range(load_task("scoop").horizon):
+        reward, _, truncated = episodes.control(SLOT, IDLE)
+        rewards.append(float(reward[0]))
+    assert truncated[0]
+    assert not episodes.success(SLOT)[0]
+    assert episodes.simulator.outcome[0] == 0.0
+    assert sum(rewards) == pytest.approx(len(rewards) * scoop.TABLE.slack_reward, abs=0.02)
+    simulator: Any = episodes.simulator
+    balls = simulator.bodies[0, : scoop.NUM_BALLS]
+    assert balls[:, 1].max() < scoop.RIM
+    assert np.linalg.norm(balls[:, 2:], axis=1).max() < scoop.REST_SPEED
+
+
+@pytest.mark.parametrize("wanted", [1, 5])
+def test_rewards_add_up_to_the_progress_made(wanted: int) -> None:
+    task = load_task("scoop")
+    tool = task.script().design(np.full((1, task.layout.size), wanted, np.float32))
+    episodes = started(instance(wanted), tool.astype(np.float64))
+    simulator: Any = episodes.simulator
+    total, steps, ended = 0.0, 0, False
+    while not ended:
+        act = task.script().act(episodes.observation)
+        reward, terminated, truncated = episodes.control(SLOT, act.astype(np.float64))
+        total, steps, ended = total + float(reward[0]), steps + 1, bool(terminated[0] or truncated[0])
+    held, lowest = simulator.outcome[0], simulator.lowest[0]
+    lift = min(1.0, (lowest - scoop.TOOL_START[1]) / (scoop.CEILING - scoop.TOOL_START[1]))
+    number = ((1.0 + min(held, wanted)) / (1.0 + max(held, wanted))) ** scoop.NUMBER_EXPONENT
+    success = scoop.SUCCESS_REWARD * bool(episodes.success(SLOT)[0])
+    assert held > 0.0
+    assert total == pytest.approx(lift * number + steps * scoop.TABLE.slack_reward + success, abs=1e-6)
+
+
+def test_the_script_scoops_most_numbers_with_its_own_tools_and_few_with_one() -> None:
+    task = load_task("scoop")
+    wanted = np.repeat(np.arange(scoop.GOAL_NUMBERS[0], scoop.GOAL_NUMBERS[1] + 1), 6)
+    rng = np.random.default_rng(3)
+    instances = task.sample_instances(rng, len(wanted))
+    instances[:, 0] = wanted
+    script = task.script()
+    own = evaluate(task, script, instances=instances)
+    assert own.successes.mean() > 0.5
+    means = [own.outcomes[wanted == number].mean() for number in np.unique(wanted)]
+    assert np.corrcoef(means, np.unique(wanted))[0, 1] > 0.95
+    for number in (2, 4, 6):  # With one tool, whatever is wanted, the script lifts what fits into it.
+        shown = np.full((1, task.layout.size), number, np.float32)
+        one = evaluate(task, _Fixed(script, script.design(shown)), instances=instances)
+        assert one.successes[wanted != number].mean() < 0.3
+        assert np.abs(one.outcomes - number).mean() < 2.0
+
+
+class _Fixed(Behaviour):
+    """A script that always uses the same tool."""
+
+    def __init__(self, script: Behaviour, tool: Singles) -> None:
+        self.script, self.tool = script, tool
+
+    def design(self, observation: Singles) -> Singles:
+        return np.repeat(self.tool, len(observation), axis=0)
+
+    def act(self, observation: Singles) -> Singles:
+        return self.script.act(observation)

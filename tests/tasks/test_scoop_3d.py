@@ -1,0 +1,274 @@
+"""Scoop 3D against its documentation: the tool's geometry, where balls lie, what counts as held, success and reward.
+
+Nothing here depends on a tuned number: all of them are read from the task's module. Lengths are in m, times in s.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pybullet
+import pytest
+
+from codesign_bench.episodes import Episodes
+from codesign_bench.evaluate import evaluate
+from codesign_bench.registry import load_module
+from codesign_bench.sensitivity import GivenTools
+from codesign_bench.task import Floats, load_task
+
+scoop: Any = load_module("tasks", "scoop_3d")
+SLOT = np.array([0])
+LIFT = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
+SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
+"""A title in the docstring and the indented text below it."""
+
+
+def tool_for(count: int) -> Floats:
+    """Return the script's normalised tool (1, D) for a number of balls."""
+    return np.array([scoop._Script.TOOLS[count - 1]])
+
+
+def started(wanted: int, design: Floats, pile: int = 3) -> Episodes:
+    """Return an episode behind its design step."""
+    episodes = Episodes(load_task("scoop_3d"), 1)
+    episodes.begin(SLOT, np.array([[float(wanted), float(pile)]]))
+    episodes.design(SLOT, design)
+    return episodes
+
+
+def lift_to_the_end(episodes: Episodes) -> tuple[list[float], bool]:
+    """Play the script's controller to the episode's end; return the rewards and whether it was cut by the limit."""
+    script, rewards = load_task("scoop_3d").script(), []
+    while True:
+        reward, terminated, truncated = episodes.control(SLOT, script.act(episodes.observation).astype(np.float64))
+        rewards.append(float(reward[0]))
+        if terminated[0] or truncated[0]:
+            return rewards, bool(truncated[0])
+
+
+def box_tool(width: float, length: float, height: float, angle: float = 0.0) -> Floats:
+    """Return a design (1, D) whose four sides are alike, in the design space's units."""
+    return np.array([[width, length, *[height] * 4, *[angle] * 4]])
+
+
+def test_the_docstring_tells_the_constants() -> None:
+    task = load_task("scoop_3d")
+    text = inspect.cleandoc(str(task.__doc__))
+    sections = {title: " ".join(body.split()) for title, body in SECTION.findall(text)}
+    space, state = task.design_space, task.state_space
+    for title, numbers in {
+        "Action space": (
+            f"{space.low[0]:g} to {space.high[0]:g} m",
+            f"{space.low[2]:g} to {space.high[2]:g} m",
+            f"+-{np.rad2deg(space.high[6]):g} degrees",
+            f"{2.0 * scoop.HALF_THICKNESS:g} m thick",
+            f"{scoop.CONTROL_SCALE:g} times +-{scoop.TABLE.control_action_max[5]:g}",
+            "{:g}, {:g} and {:g} rad".format(*scoop.LARGEST_TURN),
+        ),
+        "Observation": (
+            f"{state.low[2]:g} .. {state.high[2]:g} |",
+            f"of {scoop.HELD_STEPS} |",
+            f"of {scoop.LOST_STEPS} |",
+            f"| {scoop.WANTED[0]} .. {scoop.WANTED[1]} |",
+        ),
+        "Goal space": (f"from {scoop.WANTED[0]} to {scoop.WANTED[1]}",),
+        "Reward": (
+            f"change of {scoop.PROGRESS_REWARD:g} h c",
+            f"{-scoop.TABLE.slack_reward:g} per control step",
+            f"+ {scoop.TABLE.success_reward:g} on success",
+            f"^{scoop.CLOSENESS_POWER:g}",
+        ),
+        "Starting state": (
+            "({:g}, {:g})".format(*scoop.TOOL_START),
+            f"{scoop.FLOOR_CLEARANCE:g} m above the floor",
+            f"for {scoop.SETTLING_STEPS} control steps",
+        ),
+        "Episode end": (
+            f"lower than {scoop.LINE:g} m",
+            f"for {scoop.HELD_STEPS} control steps",
+            f"{scoop.HELD_SPEED:g} m/s",
+            f"for {scoop.LOST_STEPS} control steps",
+            f"{task.horizon} control steps (paper) of 1/{1.0 / task.control_period:g} s",
+        ),
+    }.items():
+        assert [number for number in numbers if number not in sections[title]] == [], title
+
+
+def test_an_upright_box_by_hand() -> None:
+    thick = scoop.HALF_THICKNESS
+    boxes = scoop.scoop_boxes(box_tool(0.12, 0.1, 0.06))
+    _, back, bottom, front, left, right = range(6)
+    np.testing.assert_allclose(boxes.half_extents[0, bottom], [0.06, 0.05, thick])
+    np.testing.assert_allclose(boxes.half_extents[0, [back, front]], [[0.06, thick, 0.03]] * 2)
+    np.testing.assert_allclose(boxes.half_extents[0, [left, right]], [[thick, 0.05, 0.03]] * 2)
+    np.testing.assert_allclose(boxes.centres[0, front], [0.0, 0.05 + thick, 0.03 - thick])
+    np.testing.assert_allclose(boxes.centres[0, back], [0.0, -0.05 - thick, 0.03 - thick])
+    np.testing.assert_allclose(boxes.centres[0, right], [0.06 + thick, 0.0, 0.03 - thick])
+    np.testing.assert_allclose(boxes.centres[0, left], [-0.06 - thick, 0.0, 0.03 - thick])
+
+
+@pytest.mark.parametrize("angle", [-0.2, 0.0, 0.2])
+def test_the_inner_faces_of_the_boxes_are_where_the_counting_takes_them_to_be(angle: float) -> None:
+    design = box_tool(0.12, 0.1, 0.06, angle)
+    boxes = scoop.scoop_boxes(design)
+    matrices = scoop.rotation_matrices(boxes.rotations[0])
+    for side, node in enumerate((1, 3, 4, 5)):
+        axis = int(np.argmax(np.abs(scoop.OUTWARDS[side])))
+        for up, face in product((-1.0, 1.0), (-1.0, 1.0)):  # Foot and rim of the inner and the outer face.
+            corner = boxes.half_extents[0, node] * [0.0, 0.0, up]
+            corner[axis] = face * scoop.OUTWARDS[side, axis] * scoop.HALF_THICKNESS
+            point = boxes.centres[0, node] + matrices[node] @ corner
+            distance = scoop.beyond_sides(design, point[None, None])[0, 0, side]
+            assert distance == pytest.approx((1.0 + face) * scoop.HALF_THICKNESS, abs=1e-12)
+
+
+def test_balls_above_the_bottom_and_between_the_sides_count_by_hand() -> None:
+    points = np.array([[0.0, 0.0, 0.03], [0.0, 0.0, 0.2], [0.0, 0.0, -0.03], [0.08, 0.0, 0.03], [0.0, -0.07, 0.03]])
+    upright = scoop.above_bottom(box_tool(0.12, 0.1, 0.06), points[None])[0]
+    assert upright.tolist() == [True, True, False, False, False]
+    open_above = scoop.above_bottom(box_tool(0.12, 0.1, 0.06, 0.25), np.array([[[0.08, 0.0, 0.06]]]))
+    assert open_above.all(), "sides that lean outwards hold more"
+
+
+def test_closeness_by_hand() -> None:
+    values = scoop.closeness(np.array([3, 0, 7, 1]), np.array([3, 3, 3, 3]))
+    np.testing.assert_allclose(values, np.array([1.0, 0.25, 0.5, 0.5]) ** scoop.CLOSENESS_POWER)
+
+
+def test_the_lowest_point_of_a_tilted_plate_by_hand() -> None:
+    design, thick = box_tool(0.12, 0.1, 0.06), scoop.HALF_THICKNESS
+    about_x = scoop.turn_matrices(np.array([[0.2, 0.0, 0.0]]))
+    assert scoop.drop(design, about_x)[0] == pytest.approx(0.05 * np.sin(0.2) + thick * np.cos(0.2))
+    about_z = scoop.turn_matrices(np.array([[0.0, 0.0, 0.3]]))
+    assert scoop.drop(design, about_z)[0] == pytest.approx(thick)
+
+
+def test_instances_are_whole_numbers_of_balls_all_alike() -> None:
+    wanted = load_task("scoop_3d").sample_instances(np.random.default_rng(0), 7_000)[:, 0]
+    counts = np.array([(wanted == number).sum() for number in range(scoop.WANTED[0], scoop.WANTED[1] + 1)])
+    assert counts.sum() == 7_000
+    assert np.abs(counts - 1_000).max() < 120  # Four standard deviations.
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_balls_lie_side_by_side_in_the_reservoir(seed: int) -> None:
+    places = scoop.lay_balls(np.random.default_rng(seed))
+    assert places.shape == (scoop.BALLS, 3)
+    assert (np.abs(places[:, :2]) + scoop.BALL_RADIUS <= scoop.RESERVOIR).all()
+    apart = np.linalg.norm(places[:, None] - places, axis=2) + np.eye(scoop.BALLS)
+    assert apart.min() >= 2.0 * scoop.BALL_RADIUS
+
+
+def test_nothing_overlaps_before_the_balls_are_poured(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scoop, "SETTLING_STEPS", 0)
+    task, rng = load_task("scoop_3d"), np.random.default_rng(2)
+    alike = [
+        (width, length, *[height] * 4, *[angle] * 4) for width, length, height, angle in product((-1.0, 1.0), repeat=4)
+    ]
+    designs = np.vstack([alike, rng.choice([-1.0, 1.0], size=(24, 10)), rng.uniform(-1.0, 1.0, size=(8, 10))])
+    episodes, slots = Episodes(task, len(designs)), np.arange(len(designs))
+    episodes.begin(slots, task.sample_instances(rng, len(designs)))
+    episodes.design(slots, designs)
+    assert max(episodes.simulator.inspect(slot).overlap for slot in range(len(designs))) < 1e-4
+
+
+def test_the_script_solves_most_instances_and_some_of_every_number() -> None:
+    task = load_task("scoop_3d")
+    numbers = np.tile(np.arange(scoop.WANTED[0], scoop.WANTED[1] + 1), 4)
+    result = evaluate(task, task.script(), instances=np.stack([numbers, 50.0 + np.arange(28)], axis=1))
+    assert result.successes.mean() > 0.7
+    assert set(numbers[result.successes]) == set(numbers)
+
+
+def test_no_tool_of_the_script_serves_all_numbers() -> None:
+    task = load_task("scoop_3d")
+    numbers = np.arange(scoop.WANTED[0], scoop.WANTED[1] + 1)
+    instances = np.stack([numbers, np.full(7, 9.0)], axis=1)
+    for tool in (2, 6):
+        given = GivenTools(np.repeat(tool_for(tool), 7, axis=0), task.script())
+        assert evaluate(task, given, instances=instances).successes.mean() < 0.5
+
+
+def test_the_right_number_held_for_long_enough_is_a_success() -> None:
+    episodes = started(5, tool_for(5))
+    rewards, _ = lift_to_the_end(episodes)
+    assert episodes.success(SLOT).all()
+    assert episodes.simulator.outcome[0] == 5
+    assert episodes.simulator.state[0, 10] == 1.0
+    assert rewards[-1] > 0.9 * scoop.TABLE.success_reward
+    assert max(rewards[:-1]) < 0.5 * scoop.TABLE.success_reward
+
+
+def test_a_wrong_number_fails_after_a_while_above_the_line() -> None:
+    episodes = started(1, tool_for(6))
+    rewards, truncated = lift_to_the_end(episodes)
+    assert episodes.simulator.failure[0]
+    assert not episodes.success(SLOT).any()
+    assert not truncated
+    assert episodes.simulator.outcome[0] > 1
+    assert len(rewards) > scoop.LOST_STEPS
+
+
+def test_an_idle_tool_holds_nothing_however_full_it_is() -> None:
+    episodes = started(6, tool_for(6))
+    assert episodes.observation[0, 7] >= 6
+    for _ in range(scoop.HELD_STEPS + 2):
+        reward, terminated, _ = episodes.control(SLOT, 0.0 * LIFT)
+        assert not terminated[0]
+        assert abs(reward[0]) < 0.1
+    assert episodes.simulator.outcome[0] == 0
+
+
+def test_a_ball_that_flies_past_is_not_held() -> None:
+    episodes = started(2, tool_for(1))
+    simulator: Any = episodes.simulator
+    for _ in range(12):
+        episodes.control(SLOT, LIFT)
+    assert simulator.outcome[0] == 1
+    world, inside = simulator.worlds[0], scoop.above_bottom(simulator.designs, simulator.local)[0]
+    ball = simulator.moving[0][int(np.flatnonzero(~inside)[0])]
+    above = simulator.pose[0, :3] + [0.0, 0.0, 0.2]
+    pybullet.resetBasePositionAndOrientation(ball, above, scoop.LEVEL, physicsClientId=world)
+    pybullet.resetBaseVelocity(ball, [0.0, 0.0, 1.5], physicsClientId=world)
+    episodes.control(SLOT, 0.0 * LIFT)
+    assert episodes.observation[0, 7] == 2, "above the tool"
+    assert simulator.outcome[0] == 1, "but not held"
+    assert simulator.held_steps[0] == 0
+
+
+def test_rewards_add_up_to_the_documented_potential() -> None:
+    episodes = started(3, tool_for(6))
+    rewards, _ = lift_to_the_end(episodes)
+    few, many = sorted((episodes.observation[0, 7] + 1.0, 4.0))
+    expected = scoop.PROGRESS_REWARD * (few / many) ** scoop.CLOSENESS_POWER + scoop.TABLE.slack_reward * len(rewards)
+    assert sum(rewards) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_tool_keeps_to_its_limits_whatever_the_control(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    episodes = started(3, tool_for(3 + seed))
+    simulator: Any = episodes.simulator
+    slack = 0.004
+    for _ in range(25):
+        before = simulator.pose[0].copy()
+        episodes.control(SLOT, np.sign(rng.uniform(-1.0, 1.0, size=(1, 6))))
+        after = simulator.pose[0]
+        assert (np.abs(after - before)[:3] < scoop.CONTROL_SCALE + slack).all()
+        assert (np.abs(after[:2] - scoop.TOOL_START[:2]) < np.array(scoop.REACH) + slack).all()
+        assert (np.abs(after[3:]) < np.array(scoop.LARGEST_TURN) + 0.05).all()
+        assert scoop.FLOOR_CLEARANCE < after[2] < scoop.HIGHEST + slack
+
+
+def test_balls_that_are_not_scooped_stay_in_the_reservoir() -> None:
+    episodes = started(5, tool_for(7))
+    lift_to_the_end(episodes)
+    simulator: Any = episodes.simulator
+    balls = simulator.bodies[0, :, :3]
+    assert (np.abs(balls[:, :2]) < scoop.RESERVOIR).all()
+    low = balls[:, 2] < scoop.WALL_HEIGHT
+    assert low.sum() + simulator.outcome[0] == scoop.BALLS

@@ -1,0 +1,77 @@
+"""`codesign-bench bench tasks` measures what it says; how fast anything is, no test asserts."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from codesign_bench.benchmarks.tasks import HEADER, TaskSpeed, measure_task
+from codesign_bench.cli import main
+from codesign_bench.task import Floats, Simulator, Slots, Task, load_task
+
+ENGINE_SECONDS, REST_SECONDS, START_SECONDS = 0.002, 0.001, 0.003
+
+
+class _Sleeps(Simulator):
+    """A simulator whose parts take known times."""
+
+    def begin(self, slots: Slots, instances: Floats) -> None:
+        time.sleep(START_SECONDS)
+        self.advance(slots)  # Physics that the start of an episode needs.
+        self.success[slots] = False
+
+    def build(self, slots: Slots, designs: Floats) -> None:
+        pass
+
+    def step(self, slots: Slots, controls: Floats) -> None:
+        self.advance(slots)
+        time.sleep(REST_SECONDS)
+
+    def advance(self, slots: Slots) -> None:
+        time.sleep(ENGINE_SECONDS)
+
+
+def test_the_engines_share_is_told_from_the_rest_and_from_episode_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    push = load_task("push")
+
+    class Sleepy(type(push)):  # type: ignore[misc]  # a class that is only known here
+        horizon = 10
+
+        def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
+            return _Sleeps(num_slots, self.state_space.size)
+
+    def load(name: str) -> Task:
+        return Sleepy()
+
+    monkeypatch.setattr("codesign_bench.benchmarks.tasks.load_task", load)
+    speed = measure_task("sleepy", seconds=0.2, slots=4)
+    steps, begun = speed.control_steps / 4, -(-speed.control_steps // 40)
+    assert ENGINE_SECONDS * steps <= speed.engine < speed.control
+    assert speed.control - speed.engine >= REST_SECONDS * steps
+    assert speed.starts >= (START_SECONDS + ENGINE_SECONDS) * begun
+    assert speed.env_steps == speed.control_steps + 4 * begun
+
+
+def test_the_printed_numbers_by_hand() -> None:
+    speed = TaskSpeed(env_steps=1_100, control_steps=1_000, engine=0.2, control=0.3, starts=0.1)
+    # 1,100 steps in 0.4 s; 0.3 s / 1,000 = 300 us; 200 us; 1.5; a quarter.
+    assert speed.row == ("2,750", "300.0", "200.0", "1.50", "25 %")
+
+
+def test_the_command_prints_a_row_per_task(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "tasks", "--task", "push", "--seconds", "0.1"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    header = next(line for line in lines if line.startswith(HEADER[0]))
+    assert all(name in header for name in HEADER)
+    row = lines[lines.index(header) + 1].split()
+    assert row[0] == "push"
+    assert np.isfinite(float(row[4]))
+
+
+def test_bad_input_gets_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "tasks", "--task", "pull"]) == 2
+    assert "unknown task 'pull'" in capsys.readouterr().err
+    assert main(["bench", "tasks", "--task", "push", "--seconds", "-1"]) == 2
+    assert "--seconds must be positive" in capsys.readouterr().err

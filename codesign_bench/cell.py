@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import product
 from pathlib import Path
 
@@ -26,6 +26,10 @@ class Cell:
     """Fraction of the training region that is never trained on, or None."""
     alpha: float | None = None
     """Coefficient of the trade-off reward, or None for the task's reward alone."""
+    finetune: int | None = None
+    """Number, from 1, of the task's fine-tuning instance to go on with from the finished default cell, or None."""
+    scratch: int | None = None
+    """Number of the fine-tuning instance to learn from scratch, or None."""
     profile: str = "laptop"
     steps: int | None = None
     """Budget in environment steps, or None for the profile's."""
@@ -34,9 +38,23 @@ class Cell:
 
     @property
     def variant(self) -> str:
-        """The name of the variant, e.g. `default`, `cutout-0.40`, `alpha-0.30`, `cutout-0.40_alpha-0.30`."""
-        parts = (("cutout", self.cutout), ("alpha", self.alpha))
-        return "_".join(f"{name}-{_two_digits(value)}" for name, value in parts if value is not None) or "default"
+        """The name of the variant, e.g. `default`, `cutout-0.40`, `cutout-0.40_alpha-0.30`, `finetune-1`."""
+        parts = [f"{name}-{_two_digits(value)}" for name, value in self._shares if value is not None]
+        parts += [f"{name}-{number}" for name, number in self._numbers if number is not None]
+        return "_".join(parts) or "default"
+
+    @property
+    def _shares(self) -> tuple[tuple[str, float | None], ...]:
+        return (("cutout", self.cutout), ("alpha", self.alpha))
+
+    @property
+    def _numbers(self) -> tuple[tuple[str, int | None], ...]:
+        return (("finetune", self.finetune), ("scratch", self.scratch))
+
+    @property
+    def start(self) -> int | None:
+        """The number of its fine-tuning instance, or None."""
+        return self.scratch if self.finetune is None else self.finetune
 
     @property
     def name(self) -> str:
@@ -49,12 +67,26 @@ class Cell:
 
     def config(self) -> ResolvedConfig:
         """Return its resolved configuration."""
-        return resolve(load_method(self.method), self.task, self.profile, self.overrides, self.steps)
+        config = resolve(load_method(self.method), self.task, self.profile, self.overrides, self.steps)
+        if self.start is None or self.steps is not None:
+            return config
+        run = replace(config.run, steps=config.run.fine_tuning_steps)
+        return replace(config, run=run, sources={**config.sources, "run.steps": "fine_tuning_steps"})
+
+    def pretrained(self) -> Cell:
+        """Return the default cell that a fine-tuning cell goes on from."""
+        return replace(self, finetune=None)
+
+    def pretrained_folder(self, folder: Path) -> Path:
+        """Return the folder of the default cell that the fine-tuning cell in `folder` goes on from."""
+        return folder.parent.parent / self.pretrained().variant / folder.name
 
     def problem(self, config: ResolvedConfig) -> Problem:
         """Return what its method is asked to learn."""
         tradeoff = None if self.alpha is None else Tradeoff(self.alpha, config.run.tradeoff_scale)
-        return Problem(load_task(self.task), cutout=self.cutout or 0.0, tradeoff=tradeoff)
+        task = load_task(self.task)
+        instances = None if self.start is None else task.fine_tuning_instances()[self.start - 1 : self.start]
+        return Problem(task, cutout=self.cutout or 0.0, tradeoff=tradeoff, instances=instances)
 
     def to_json(self) -> str:
         """Return it as a line of JSON."""
@@ -74,18 +106,23 @@ def grid(
     seeds: Sequence[int],
     cutouts: Sequence[float] = (),
     alphas: Sequence[float] = (),
+    finetunes: Sequence[int] = (),
+    scratches: Sequence[int] = (),
     profile: str = "laptop",
     steps: int | None = None,
     overrides: Sequence[str] = (),
 ) -> Iterator[Cell]:
     """Yield every cell of tasks x seeds x variants x methods; seeds come before methods, so that a sweep cut short
     has every method."""
-    for task, seed, cutout, alpha, method in product(tasks, seeds, cutouts or (None,), alphas or (None,), methods):
-        yield Cell(task, method, seed, cutout, alpha, profile, steps, tuple(overrides))
+    starts: list[tuple[int | None, int | None]] = [(number, None) for number in finetunes]
+    starts += [(None, number) for number in scratches]
+    variants = product(cutouts or (None,), alphas or (None,), starts or [(None, None)])
+    for task, seed, (cutout, alpha, (finetune, scratch)), method in product(tasks, seeds, list(variants), methods):
+        yield Cell(task, method, seed, cutout, alpha, finetune, scratch, profile, steps, tuple(overrides))
 
 
 def check_cells(cells: Sequence[Cell]) -> None:
-    """Refuse overrides that no method knows, and cutouts that a task cannot have.
+    """Refuse overrides that no method knows, and cutouts and fine-tuning instances that a task cannot have.
 
     Raises:
         UserError: naming the first.
@@ -96,6 +133,9 @@ def check_cells(cells: Sequence[Cell]) -> None:
         task = load_task(task_name)
         if cutout is not None:
             task.in_cutout(task.evaluation_instances()[:1], cutout)
+    for task_name, number in dict.fromkeys((cell.task, cell.start) for cell in cells):
+        if number is not None and not 1 <= number <= (count := len(load_task(task_name).fine_tuning_instances())):
+            raise UserError(f"fine-tuning instance {number}: task '{task_name}' has 1 to {count}")
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:

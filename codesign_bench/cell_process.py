@@ -22,7 +22,7 @@ from codesign_bench.cell import Cell
 from codesign_bench.config import ResolvedConfig, differences
 from codesign_bench.errors import UserError
 from codesign_bench.files import remove_partial_files
-from codesign_bench.host import host_facts, package_versions
+from codesign_bench.host import EXIT_ORPHANED, host_facts, package_versions
 from codesign_bench.method import load_method
 from codesign_bench.registry import import_modules
 from codesign_bench.results import (
@@ -41,7 +41,7 @@ from codesign_bench.results import (
 )
 from codesign_bench.training import CellRun
 
-EXIT_DONE, EXIT_FAILED, EXIT_REFUSED, EXIT_BUSY, EXIT_ORPHANED = 0, 1, 2, 75, 76
+EXIT_DONE, EXIT_FAILED, EXIT_REFUSED, EXIT_BUSY = 0, 1, 2, 75
 LOCK_SECONDS = 2.0
 """Longer than a look at the lock by `status` takes."""
 
@@ -71,11 +71,11 @@ def run_locked(cell: Cell, folder: Path, *, retry: bool) -> int:
         return EXIT_FAILED
     import_modules([])
     config = cell.config()
-    if before is not None and (different := differences(before["config"], config.as_json())):
+    if before is not None and (different := differences(before["config"], config)):
         print(f"another configuration: {'; '.join(different)}", file=sys.stderr)
         return EXIT_REFUSED
     remove_partial_files(folder)
-    pin_threads(config.run.threads)
+    pin_threads()
     content = describe(cell, config, before)
     write_cell(folder, content)
     return _run_and_record(cell, config, folder, content)
@@ -100,10 +100,13 @@ def describe(cell: Cell, config: ResolvedConfig, before: dict[str, Any] | None) 
     }
 
 
-def pin_threads(threads: int) -> None:
-    """Pin torch, where a method has imported it; the other libraries read their environment variables."""
+def pin_threads() -> None:
+    """Pin torch to one thread, where a method has imported it; the other libraries read their environment variables.
+
+    Sums of floats depend on a library's threads. More cores are used side by side instead: see `Method.use_cores`.
+    """
     if "torch" in sys.modules:
-        sys.modules["torch"].set_num_threads(threads)
+        sys.modules["torch"].set_num_threads(1)
 
 
 def failure(message: str, trace: str) -> dict[str, str]:

@@ -26,6 +26,7 @@ class Progress:
     """Where a cell stands; the curve's rows are part of it, so that file and learner can never disagree."""
 
     env_steps: int = 0
+    gradient_steps: int = 0
     next_mark: int = 0
     """Index of the next evaluation."""
     curve: list[dict[str, Any]] = field(default_factory=list)

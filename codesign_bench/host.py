@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import platform
 import socket
+import threading
+import time
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,13 @@ THREAD_VARIABLES = (
 """What the numerical libraries read when they are first imported."""
 
 
+BFLOAT16_FLAGS = ("amx_bf16", "avx512_bf16", "bf16")
+"""What processors that compute in bfloat16 say of themselves: Intel's and AMD's, and ARM's."""
+WATCH_SECONDS = 0.3
+EXIT_ORPHANED = 76
+"""Exit code of a process whose parent is gone."""
+
+
 def available_cores() -> int:
     """Return how many cores this process may use: its affinity and its container's quota count."""
     import joblib  # not at the top: the process of a cell has no other use for it
@@ -27,9 +36,20 @@ def available_cores() -> int:
     return int(joblib.cpu_count())
 
 
-def thread_environment(threads: int) -> dict[str, str]:
-    """Return this process's environment with the numerical libraries pinned to `threads`."""
-    return {**os.environ, **dict.fromkeys(THREAD_VARIABLES, str(threads))}
+def thread_environment() -> dict[str, str]:
+    """Return this process's environment with the numerical libraries pinned to one thread."""
+    return {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")}
+
+
+def end_with(parent_pid: int) -> None:
+    """End this process soon after its parent ends, however it ends: an orphan would hold a core for nothing."""
+
+    def watch() -> None:
+        while os.getppid() == parent_pid:
+            time.sleep(WATCH_SECONDS)
+        os._exit(EXIT_ORPHANED)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def package_versions() -> dict[str, str | None]:
@@ -52,6 +72,18 @@ def host_facts(threads: int) -> dict[str, Any]:
         "cores": os.cpu_count(),
         "threads": threads,
     }
+
+
+def computes_in_bfloat16() -> bool:
+    """Tell whether this processor multiplies matrices in bfloat16 itself; elsewhere that is slower than in fp32."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return False
+    flags = {
+        flag for line in lines if line.startswith(("flags", "Features")) for flag in line.partition(":")[2].split()
+    }
+    return not flags.isdisjoint(BFLOAT16_FLAGS)
 
 
 def _processor() -> str:

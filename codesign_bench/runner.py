@@ -1,26 +1,25 @@
-"""Run a grid of cells: plan what is left to do, spread it over joblib workers, report how it ended."""
+"""Run a grid of cells: plan what is left to do, spread it over workers, report how it ended."""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from joblib import Parallel, delayed
-from joblib.externals.loky import get_reusable_executor
-from joblib.externals.loky.process_executor import BrokenProcessPool
 from rich.console import Console
 
+from codesign_bench.backends import Backend, WorkersDied, make_backend
 from codesign_bench.cell import Cell
 from codesign_bench.checkpoint import load_checkpoint
 from codesign_bench.config import ResolvedConfig, differences
 from codesign_bench.errors import UserError
 from codesign_bench.host import available_cores
 from codesign_bench.progress import ProgressDisplay
+from codesign_bench.registry import IMPORTS_VARIABLE
 from codesign_bench.results import (
     CHECKPOINT_FILE,
     CURVE_FILE,
@@ -30,7 +29,7 @@ from codesign_bench.results import (
     open_folder,
     read_cell,
 )
-from codesign_bench.workers import BUSY, Job, Outcome, prepare_worker, run_job
+from codesign_bench.workers import BUSY, Job, Outcome
 
 EXIT_ALL_DONE, EXIT_SOME_FAILED = 0, 1
 MAX_BROKEN_POOLS = 10
@@ -58,6 +57,7 @@ def make_plan(cells: Sequence[Cell], out: Path, *, retry_failed: bool = False) -
     plan = Plan([], {}, [], {cell: cell.config() for cell in cells})
     contents = {cell: read_cell(cell.folder(out)) for cell in cells}
     _refuse_other_configurations(plan.configs, contents, out)
+    _refuse_without_pretrained(cells, out)
     for cell, content in contents.items():
         if content is not None and content["status"] == DONE:
             plan.done.append(cell)
@@ -88,7 +88,14 @@ def split_cores(cores: int, cells: int, threads: int, jobs: int | None) -> tuple
 
 
 def run_sweep(
-    cells: Sequence[Cell], out: Path, *, console: Console, jobs: int | None = None, retry_failed: bool = False
+    cells: Sequence[Cell],
+    out: Path,
+    *,
+    console: Console,
+    jobs: int | None = None,
+    retry_failed: bool = False,
+    backend: str = "loky",
+    scheduler: str | None = None,
 ) -> int:
     """Run every cell that `out` does not hold yet; return 0 if all are done in the end, 1 if some failed.
 
@@ -100,19 +107,21 @@ def run_sweep(
     plan = make_plan(cells, out, retry_failed=retry_failed)
     threads = max((config.run.threads for config in plan.configs.values()), default=1)
     used_jobs, split = split_cores(available_cores(), len(plan.pending), threads, jobs)
+    chosen = make_backend(backend, used_jobs, scheduler)
     say = _printer(console)
     say(f"{len(cells)} cells, {len(plan.done)} of them done before; results in {out}")
     failures = dict(plan.failed)
     if plan.pending:
-        say(f"running {len(plan.pending)}: {split}")
-        queue = [Job(cell, str(out), plan.configs[cell].run.threads, retry_failed) for cell in plan.pending]
+        say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
+        imported = os.environ.get(IMPORTS_VARIABLE, "")
+        queue = [Job(cell, str(out), retry_failed, imported) for cell in plan.pending]
         budgets = {cell: plan.configs[cell].run.steps for cell in plan.pending}
-        with ProgressDisplay(console, out, budgets) as display:
-            failures |= _run_queue(queue, used_jobs, display)
+        with chosen as workers, ProgressDisplay(console, out, budgets) as display:
+            failures |= _run_queue(queue, workers, display)
     return _conclude(say, len(cells), failures, plan.failed)
 
 
-def _run_queue(queue: list[Job], jobs: int, display: ProgressDisplay) -> dict[Cell, str]:
+def _run_queue(queue: list[Job], workers: Backend, display: ProgressDisplay) -> dict[Cell, str]:
     """Run all jobs; cells that another sweep holds come last. Return the failures."""
     failures: dict[Cell, str] = {}
     waiting_told = False
@@ -127,37 +136,17 @@ def _run_queue(queue: list[Job], jobs: int, display: ProgressDisplay) -> dict[Ce
             continue
         ended = 0
         try:
-            for outcome in _dispatch(free, jobs):
+            for outcome in workers.dispatch(free):
                 if outcome.status != BUSY:
                     ended += 1
                     queue = [job for job in queue if job.cell != outcome.cell]
                     _tell(outcome, display, failures)
-        except BrokenProcessPool as error:
+        except WorkersDied as error:
             broken = 0 if ended else broken + 1
             if broken == MAX_BROKEN_POOLS:
                 raise RuntimeError("the worker processes keep dying") from error
             display.say("a worker process died; its cells are started again from their checkpoints")
     return failures
-
-
-def _dispatch(queue: Sequence[Job], jobs: int) -> Iterator[Outcome]:
-    """Yield outcomes as they come. The pool is taken down on every way out, so that no process stays behind."""
-    main_pid = os.getpid()
-    pool = Parallel(
-        n_jobs=jobs,
-        backend="loky",
-        return_as="generator_unordered",
-        batch_size=1,
-        pre_dispatch=jobs,
-        initializer=prepare_worker,
-        initargs=(main_pid,),
-    )
-    try:
-        yield from pool(delayed(run_job)(job) for job in queue)
-    except BaseException:
-        if jobs > 1:
-            get_reusable_executor().shutdown(wait=False, kill_workers=True)
-        raise
 
 
 def _tell(outcome: Outcome, display: ProgressDisplay, failures: dict[Cell, str]) -> None:
@@ -181,13 +170,25 @@ def _refuse_other_configurations(
     refused = [
         (cell, different)
         for cell, content in contents.items()
-        if content is not None and (different := differences(content["config"], configs[cell].as_json()))
+        if content is not None and (different := differences(content["config"], configs[cell]))
     ]
     if refused:
         cell, different = refused[0]
         shown = "; ".join(different[:6]) + (f"; and {len(different) - 6} more" if len(different) > 6 else "")
         others = f" (and {len(refused) - 1} cells more)" if len(refused) > 1 else ""
         raise UserError(f"{cell.folder(out)}{others} was run with another configuration: {shown}\nchoose another --out")
+
+
+def _refuse_without_pretrained(cells: Sequence[Cell], out: Path) -> None:
+    for cell in cells:
+        if cell.finetune is not None:
+            before = cell.pretrained()
+            content = read_cell(before.folder(out))
+            if content is None or content["status"] != DONE:
+                raise UserError(
+                    f"--finetune: {cell.name} goes on from {before.name}, which is not done in {out}\nrun it first: "
+                    f"codesign-bench run --method {cell.method} --task {cell.task} --seeds {cell.seed}-{cell.seed}"
+                )
 
 
 def _conclude(say: Any, cells: int, failures: dict[Cell, str], earlier: dict[Cell, str]) -> int:

@@ -17,7 +17,7 @@ from codesign_bench.config import ResolvedConfig
 from codesign_bench.evaluate import Evaluation, evaluate, rows
 from codesign_bench.files import write_json
 from codesign_bench.method import BatchReport, Method, load_method
-from codesign_bench.policy_files import save_policy
+from codesign_bench.policy_files import policy_tensors, save_policy
 from codesign_bench.results import (
     CHECKPOINT_FILE,
     CURVE_COLUMNS,
@@ -51,11 +51,15 @@ class CellRun:
         self.problem = cell.problem(config)
         self.streams = Streams(cell.seed)
         self.method: Method[Any] = load_method(cell.method)(self.problem, config.method, self.streams)
+        self.method.use_cores(config.run.threads)
+        self.method.use_device(config.run.device)
         checkpoint = load_checkpoint(folder / CHECKPOINT_FILE)
         self.progress = Progress() if checkpoint is None else checkpoint.progress
         if checkpoint is not None:
             self.method.load_state(checkpoint.state)
             self.streams.load_state(checkpoint.streams)
+        elif cell.finetune is not None:
+            self.method.start_from(policy_tensors(cell.pretrained_folder(folder)))
         self._interval = float(os.environ.get(CHECKPOINT_SECONDS_VARIABLE, CHECKPOINT_SECONDS))
         self._started = self._saved = time.monotonic()
         self._reported = float("-inf")
@@ -91,6 +95,7 @@ class CellRun:
             raise RuntimeError(f"{self.cell.method}.train reported {report.env_steps} environment steps")
         self.progress.train_s += time.monotonic() - start
         self.progress.env_steps += report.env_steps
+        self.progress.gradient_steps += report.gradient_steps
         self._add_metrics(report)
 
     def _add_metrics(self, report: BatchReport) -> None:
@@ -103,10 +108,17 @@ class CellRun:
         """Add a row to the curve and save; at most one row even when a batch passes several marks."""
         self._report("evaluating")
         start = time.monotonic()
-        evaluation = self._last_evaluation = evaluate(self.problem.task, self.method.policy(), self.problem.tradeoff)
+        evaluation = self._last_evaluation = self._judge()
         progress = self.progress
         progress.evaluate_s += time.monotonic() - start
-        progress.curve.append({"env_steps": progress.env_steps, "wall_s": self._wall_s(), **evaluation.summary})
+        progress.curve.append(
+            {
+                "env_steps": progress.env_steps,
+                "wall_s": self._wall_s(),
+                **evaluation.summary,
+                "gradient_steps": progress.gradient_steps,
+            }
+        )
         if progress.pending_metrics:
             means = {name: total / count for name, (total, count) in progress.pending_metrics.items()}
             progress.metrics.append({"env_steps": progress.env_steps, **means})
@@ -117,6 +129,10 @@ class CellRun:
             progress.next_mark += 1
         self._save()
         self._write_curve()
+
+    def _judge(self) -> Evaluation:
+        problem = self.problem
+        return evaluate(problem.task, self.method.policy(), problem.tradeoff, problem.evaluation_instances())
 
     def _mark(self, index: int) -> int:
         """Return the environment steps at which evaluation `index` is due; 0 and the whole budget are marks."""
@@ -139,7 +155,7 @@ class CellRun:
     def _write_final(self) -> None:
         policy, task = self.method.policy(), self.problem.task
         # A cell killed after its last checkpoint comes here with no evaluation at hand.
-        evaluation = self._last_evaluation or evaluate(task, policy, self.problem.tradeoff)
+        evaluation = self._last_evaluation or self._judge()
         self._write_curve()
         write_rows(self.folder / EVALUATION_FILE, list(rows(task, evaluation, self.cell.cutout)))
         save_policy(self.folder, policy, {"task": self.cell.task, "method": self.cell.method})

@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,8 @@ import filelock
 from codesign_bench import cell_process
 from codesign_bench.cell import Cell
 from codesign_bench.errors import UserError
-from codesign_bench.host import thread_environment
+from codesign_bench.host import end_with, thread_environment
+from codesign_bench.registry import IMPORTS_VARIABLE
 from codesign_bench.results import DONE, FAILED, LOG_FILE, PROGRESS_FILE, RUNNING, cell_lock, is_locked, read_cell
 
 BUSY = "busy"
@@ -27,7 +27,6 @@ START = (
     "from codesign_bench.cell_process import start; start()"
 )
 """Starts a cell's process with this process's module path, whatever folder it is started in."""
-WATCH_SECONDS = 0.3
 SETTLE_SECONDS = 1.0
 
 
@@ -37,8 +36,9 @@ class Job:
 
     cell: Cell
     out: str
-    threads: int
     retry_failed: bool
+    imported: str
+    """Modules of `--import`, as the environment variable names them; a worker elsewhere has another environment."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +56,7 @@ def prepare_worker(main_pid: int) -> None:
     if os.getpid() == main_pid:
         return
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def watch() -> None:
-        while os.getppid() == main_pid:
-            time.sleep(WATCH_SECONDS)
-        os._exit(cell_process.EXIT_ORPHANED)
-
-    threading.Thread(target=watch, daemon=True).start()
+    end_with(main_pid)
 
 
 def run_job(job: Job) -> Outcome:
@@ -92,7 +86,7 @@ def _run_process(job: Job, folder: Path) -> int:
             stdin=subprocess.PIPE,  # never written to: its end tells the process that its parent is gone
             stdout=log,
             stderr=log,
-            env=thread_environment(job.threads),
+            env={**thread_environment(), IMPORTS_VARIABLE: job.imported},
         )
         try:
             return process.wait()

@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from codesign_bench.episodes import portions
 from codesign_bench.learning.evolution import Evolution, EvolutionConfig, paper_evolution
 from codesign_bench.learning.profiles import Tuned, tuned
 from codesign_bench.learning.ranges import check_range
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
-from codesign_bench.task import Floats, Singles, Task
+from codesign_bench.task import Booleans, Floats, Singles, Task
 
 PLAN = "plan"
 
@@ -77,7 +78,6 @@ class CmaEs(Method[Config]):
         task = problem.task
         size = task.design_space.size + task.horizon * task.control_space.size
         self.evolution = Evolution(size, config, streams["plans"])
-        self.episodes = problem.make_episodes(config.popsize * config.episodes_per_candidate)
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
@@ -107,24 +107,32 @@ class CmaEs(Method[Config]):
 
     def _play(self, plans: Floats, instances: Floats) -> tuple[Floats, int, float]:
         """Return returns (P, instances), simulated steps and success rate of all plans (P, X) on all instances."""
-        task, episodes = self.problem.task, self.episodes
         count, repeats = len(plans), len(instances)
-        slots = np.arange(count * repeats)
-        owner = np.repeat(np.arange(count), repeats)
-        designs, controls = plans[:, : task.design_space.size], plans[:, task.design_space.size :]
-        controls = controls.reshape(count, task.horizon, task.control_space.size)
-        episodes.begin(slots, np.tile(instances, (count, 1)))
-        episodes.design(slots, designs[owner])
-        returns = np.zeros(len(slots))
-        active, steps = slots, len(slots)
+        owner, instance = np.repeat(np.arange(count), repeats), np.tile(np.arange(repeats), count)
+        parts = [
+            self._play_each(plans[owner[part]], instances[instance[part]])
+            for part in portions(len(owner), self.problem.task)
+        ]
+        returns, steps, solved = (np.concatenate(values) for values in zip(*parts, strict=True))
+        return returns.reshape(count, repeats), int(steps.sum()), float(solved.mean())
+
+    def _play_each(self, plans: Floats, instances: Floats) -> tuple[Floats, Floats, Booleans]:
+        """Return return, simulated steps and success, each (b,), of plans (b, X) on one instance (b, I) each."""
+        task, slots = self.problem.task, np.arange(len(plans))
+        episodes = self.problem.make_episodes(len(slots))
+        size = task.design_space.size
+        controls = plans[:, size:].reshape(len(slots), task.horizon, task.control_space.size)
+        episodes.begin(slots, instances)
+        episodes.design(slots, plans[:, :size])
+        returns, steps, active = np.zeros(len(slots)), np.ones(len(slots)), slots
         for step in range(task.horizon):
-            reward, terminated, truncated = episodes.control(active, controls[owner[active], step])
+            reward, terminated, truncated = episodes.control(active, controls[active, step])
             returns[active] += reward
-            steps += len(active)
+            steps[active] += 1.0
             active = active[~(terminated | truncated)]
             if not active.size:
                 break
-        return returns.reshape(count, repeats), steps, float(episodes.success(slots).mean())
+        return returns, steps, episodes.success(slots).copy()
 
     def policy(self) -> Policy:
         """Return CMA-ES's mean as a policy."""

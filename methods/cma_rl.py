@@ -8,7 +8,7 @@ every one of those steps counts.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -100,7 +100,15 @@ class CmaRl(Method[Config]):
         exceptions = paper_perceptrons(CMA_RL, task_name) | paper_evolution() if profile == "paper" else {}
         return ppo_profile(profile, task_name) | exceptions | tuned(profile, TUNED)
 
-    def _candidates(self, slots: Slots, observation: Singles) -> Singles:
+    def use_cores(self, count: int) -> None:
+        """Use up to `count` cores."""
+        self.learner.use_cores(count)
+
+    def use_device(self, name: str) -> None:
+        """Update the networks on the device `name`."""
+        self.learner.use_device(name)
+
+    def _candidates(self, slots: Slots) -> Singles:
         """Give slot after slot the candidates of this generation in turn."""
         designs: Singles = self.evolution.ask()[slots % self.config.popsize].astype(np.float32)
         return designs
@@ -117,7 +125,7 @@ class CmaRl(Method[Config]):
         if (episodes > 0).all():
             self.evolution.tell(np.bincount(candidate, returns, minlength=self.config.popsize) / episodes)
             self.actor.best_design.copy_(torch.from_numpy(self.evolution.mean))
-        return BatchReport(report.env_steps, report.metrics | {"sigma": self.evolution.sigma})
+        return replace(report, metrics=report.metrics | {"sigma": self.evolution.sigma})
 
     def policy(self) -> Policy:
         """Return CMA-ES's mean design with the controller's mean."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -42,6 +43,13 @@ class PolicyLoss:
         return -surrogate - self.entropy_weight * entropy, divergence
 
 
+class Update(Protocol):
+    """One batch's update of one network."""
+
+    def step(self, rows: Slots) -> None:
+        """Take one gradient step on `rows` (m,)."""
+
+
 class PolicyUpdate:
     """One batch's policy update; stops for good once its KL divergence is too large."""
 
@@ -64,7 +72,7 @@ class PolicyUpdate:
         """Take one gradient step on `rows` (m,), unless the update has stopped."""
         if self.stopped:
             return
-        index = torch.from_numpy(rows)
+        index = torch.from_numpy(rows).to(self.advantage.device)
         log_prob, entropy = self.log_probs(rows)
         loss, self.divergence = self.loss(log_prob, self.old_log_prob[index], self.advantage[index], entropy)
         if self.divergence > self.loss.kl_threshold:
@@ -92,7 +100,7 @@ class ValueUpdate:
 
     def step(self, rows: Slots) -> None:
         """Take one gradient step on `rows` (m,)."""
-        index = torch.from_numpy(rows)
+        index = torch.from_numpy(rows).to(self.target.device)
         loss = nn.functional.mse_loss(self.predict(self.observation[index]), self.target[index])
         gradient_step(loss, self.optimizer, self.parameters, self.max_norm)
         self.loss = float(loss.detach())

@@ -47,6 +47,8 @@ class PPOConfig:
     """Gradients are clipped to this norm."""
     bootstrap_time_limit: bool = field(default=True, metadata=OURS)
     """Whether the time limit is bootstrapped by the value of the state reached; False treats it as an end in itself."""
+    normalize_observations: bool = field(default=True, metadata={"source": "Transform2Act's; the paper is silent"})
+    """Whether state and goal are normalised by their running mean and deviation; False: by their bounds."""
     normalize_returns: bool = field(default=True, metadata=OURS)
     """Whether the value network learns returns normalised by their running mean and deviation."""
     design_credit: str = "separate"

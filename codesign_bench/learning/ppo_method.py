@@ -40,6 +40,18 @@ class PPOMethod(Method[ConfigType]):
     def make_value(cls, task: Task, config: ConfigType, rng: np.random.Generator) -> ValueNetwork:
         """Return a fresh value network with weights from `rng`."""
 
+    def use_cores(self, count: int) -> None:
+        """Use up to `count` cores."""
+        self.learner.use_cores(count)
+
+    def use_device(self, name: str) -> None:
+        """Update the networks on the device `name`."""
+        self.learner.use_device(name)
+
+    def start_from(self, tensors: Mapping[str, Any]) -> None:
+        """Take over a trained designer and controller; the value networks start afresh."""
+        load_module_arrays(self.learner.actor, tensors)
+
     def train(self, remaining_steps: int) -> BatchReport:
         """Collect one batch of whole episodes and improve all networks on it."""
         return self.learner.train(remaining_steps)[0]

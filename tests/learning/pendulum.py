@@ -8,6 +8,7 @@ Shapes: `b` slots that a call names, `I` = 2 instance (angle, angular velocity),
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -50,14 +51,17 @@ OURS: dict[str, Any] = {
     "max_gradient_norm": 0.5,
     "entropy_weight": 0.0,
     "kl_threshold": float("inf"),
-    "control_log_std": 0.0,
+    "control_log_std": math.log(1.0 / MAX_TORQUE),
     "fix_std": False,
     "policy_net": (64, 64),
     "value_net": (64, 64),
     "final_learning_rate_fraction": 1.0,
     "bootstrap_time_limit": True,
 }
-"""The same settings in this project's words."""
+"""The same settings in this project's words.
+
+The other's initial deviation of 1 is in N m, ours in units of the largest torque.
+"""
 
 
 class Pendulum(Task):
@@ -108,22 +112,20 @@ class _Pendulums(Simulator):
             self.state[slot], self.reward[slot], *_ = self._environments[slot].step(MAX_TORQUE * control)
 
 
-def make_learner(seed: int) -> TwoPhaseLearner:
+def make_learner(seed: int, normalize_observations: bool) -> TwoPhaseLearner:
     """Return the PPO core with the perceptrons of `shared_arch` and a given design, so that it learns control alone."""
     method_class: Any = load_method("shared_arch")
     problem, streams = Problem(Pendulum()), Streams(seed)
-    config = replace(method_class.config_class(), **OURS)
+    config = replace(method_class.config_class(), **OURS, normalize_observations=normalize_observations)
     actor = method_class.make_actor(problem.task, config, streams["policy weights"])
     value = method_class.make_value(problem.task, config, streams["value weights"])
-    return TwoPhaseLearner(
-        problem, config, streams, actor, value, lambda slots, _: np.zeros((len(slots), 1), np.float32)
-    )
+    return TwoPhaseLearner(problem, config, streams, actor, value, lambda slots: np.zeros((len(slots), 1), np.float32))
 
 
-def train(seed: int, budget: int = BUDGET) -> float:
+def train(seed: int, normalize_observations: bool = False, budget: int = BUDGET) -> float:
     """Train the PPO core on the pendulum; return its mean return over the task's evaluation instances."""
     torch.set_num_threads(1)
-    learner = make_learner(seed)
+    learner = make_learner(seed, normalize_observations)
     while learner.env_steps < budget:
         learner.train(budget - learner.env_steps)
     return float(evaluate(learner.problem.task, learner.policy()).returns.mean())

@@ -11,7 +11,14 @@ import torch
 
 from codesign_bench.episodes import Episodes
 from codesign_bench.learning.ppo import gaussian
-from codesign_bench.learning.rollout import Collector, Trajectories, gaussian_log_prob, slots_for
+from codesign_bench.learning.rollout import (
+    Collector,
+    Trajectories,
+    gaussian_log_prob,
+    group_sizes,
+    joined,
+    slots_for,
+)
 from codesign_bench.learning.two_phase import TwoPhaseLearner
 from codesign_bench.method import Problem
 from codesign_bench.task import Task
@@ -27,7 +34,7 @@ def learner(make_learner: Callable[..., TwoPhaseLearner]) -> TwoPhaseLearner:
 
 def collect(learner: TwoPhaseLearner, seed: int = 1, steps: int = STEPS, slots: int = SLOTS) -> Trajectories:
     """Return a batch of the learner's actor."""
-    collector = Collector(learner.problem, slots)
+    collector = Collector(learner.problem)
     return collector.collect(learner.actor, steps, slots, np.random.default_rng(seed))
 
 
@@ -109,11 +116,9 @@ def test_the_generator_decides_the_batch(learner: TwoPhaseLearner) -> None:
 
 
 def test_given_designs_are_built(learner: TwoPhaseLearner) -> None:
-    collector = Collector(learner.problem, SLOTS)
+    collector = Collector(learner.problem)
     given = np.linspace(-1.0, 1.0, SLOTS, dtype=np.float32)[:, None]
-    batch = collector.collect(
-        learner.actor, STEPS, SLOTS, np.random.default_rng(0), lambda slots, observation: given[slots]
-    )
+    batch = collector.collect(learner.actor, STEPS, SLOTS, np.random.default_rng(0), given)
     design = learner.problem.task.layout.design
     for slot in range(SLOTS):
         assert (batch.design[slot, batch.is_design[slot]] == given[slot]).all()
@@ -122,7 +127,7 @@ def test_given_designs_are_built(learner: TwoPhaseLearner) -> None:
 
 
 def test_the_cutout_is_never_rolled_out(learner: TwoPhaseLearner, reach: Task) -> None:
-    collector = Collector(Problem(reach, cutout=0.5), SLOTS)
+    collector = Collector(Problem(reach, cutout=0.5))
     batch = collector.collect(learner.actor, STEPS, SLOTS, np.random.default_rng(0))
     assert batch.observation[batch.valid][:, reach.layout.goal].min() >= 0.5
 
@@ -131,10 +136,42 @@ def test_summary_by_hand(learner: TwoPhaseLearner) -> None:
     batch = collect(learner)
     successes = int(batch.terminated.sum())  # Success is this task's only end besides the time limit.
     episodes = int(batch.is_design.sum())
-    summary = batch.summary(successes)
+    summary = batch.summary()
     assert summary["train_return"] == pytest.approx(batch.reward.sum() / episodes)
     assert summary["train_success"] == pytest.approx(successes / episodes)
     assert summary["train_episode_length"] == pytest.approx((batch.env_steps - episodes) / episodes)
+
+
+@pytest.mark.parametrize(
+    ("slots", "most", "sizes"),
+    [
+        (1, 1_000, [1]),
+        (66, 1_000, [66]),
+        (191, 1_000, [191]),
+        (192, 1_000, [96, 96]),
+        (331, 1_000, [166, 165]),
+        (495, 1_000, [124, 124, 124, 123]),
+        (24, 24, [24]),
+        (25, 24, [13, 12]),
+        (99, 24, [17, 17, 17, 16, 16, 16]),
+    ],
+)
+def test_how_slots_are_grouped_follows_from_their_number_and_the_tasks_most(
+    slots: int, most: int, sizes: list[int]
+) -> None:
+    assert group_sizes(slots, most) == sizes
+
+
+def test_joined_groups_keep_their_slots_in_order_and_pad_with_steps_that_are_not_valid(
+    learner: TwoPhaseLearner,
+) -> None:
+    short, long = collect(learner, seed=1, steps=20, slots=2), collect(learner, seed=2, steps=60, slots=3)
+    batch = joined([short, long])
+    assert batch.env_steps == short.env_steps + long.env_steps
+    assert not batch.valid[:2, short.valid.shape[1] :].any()
+    for name, values in vars(batch).items():
+        np.testing.assert_array_equal(values[:2, : short.valid.shape[1]], getattr(short, name), err_msg=name)
+        np.testing.assert_array_equal(values[2:, : long.valid.shape[1]], getattr(long, name), err_msg=name)
 
 
 def test_gaussian_log_probability_equals_torchs() -> None:

@@ -175,7 +175,7 @@ def test_designs_that_are_given_are_not_learned(make_learner: MakeLearner, recor
         given.streams,
         given.actor,
         given.value,
-        lambda slots, observation: np.zeros((len(slots), 1), np.float32),
+        lambda slots: np.zeros((len(slots), 1), np.float32),
     )
     head = {name: tensor.clone() for name, tensor in learner.actor.named_parameters() if "design" in name}
     _, batch = learner.train(BUDGET)
@@ -231,3 +231,10 @@ def test_it_learns_to_touch_the_goal(make_learner: MakeLearner) -> None:
     learner = make_learner(batch_size=600, minibatch_size=100, design_minibatch_size=100, **rates)
     success = [learner.train(BUDGET)[0].metrics["train_success"] for _ in range(12)]
     assert success[0] < 0.5 < 0.8 < np.mean(success[-3:])
+
+
+def test_a_minibatch_without_a_design_step_is_learned_from(make_learner: MakeLearner) -> None:
+    learner = make_learner(design_credit="joint", minibatch_size=2, epochs=1)  # One step in six is a design step.
+    report, _ = learner.train(BUDGET)
+    assert report.metrics["policy_steps"] > 1
+    assert all(torch.isfinite(p).all() for p in learner.actor.parameters())

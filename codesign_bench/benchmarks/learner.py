@@ -1,0 +1,262 @@
+"""Speed of our learners beside others': one run, one machine, the same batch, minibatches, epochs and environment.
+
+Every contestant runs in a process of its own, so that its peak memory is its own; medians over repeats are given.
+
+Shapes: `n` environment steps of a batch.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from math import inf
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from codesign_bench.config import resolve
+from codesign_bench.errors import UserError
+from codesign_bench.files import write_json
+from codesign_bench.host import available_cores, host_facts, package_versions, thread_environment
+from codesign_bench.method import Problem, load_method
+from codesign_bench.progress import print_table
+from codesign_bench.seeding import Streams
+from codesign_bench.task import load_task
+
+
+@dataclass(frozen=True)
+class Workload:
+    """What every contestant does."""
+
+    task: str = "push"
+    batch_size: int = 50_000
+    minibatch_size: int = 2_000
+    epochs: int = 10
+    cores: int = 1
+    repeats: int = 3
+    environments: int = 50
+    """Of stable-baselines3; ours follow from the batch."""
+
+
+@dataclass(frozen=True)
+class Speed:
+    """What one contestant reached, as medians over the repeats."""
+
+    rollout: float
+    """Environment steps per second of rollouts, the policy in the loop."""
+    update: float
+    """Samples per second that pass through the update, forward and backward, policy and value."""
+    peak_megabytes: float
+    gigaflops: float | None = None
+    """Useful floating-point operations per second of the update, 1e9; None: not counted."""
+    how: str = ""
+
+    def end_to_end(self, epochs: int) -> float:
+        """Return environment steps per second of rollout and update together."""
+        return 1.0 / (1.0 / self.rollout + epochs / self.update)
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """Someone who learns, and how to measure it."""
+
+    title: str
+    measure: Callable[[Workload], Speed]
+    needs: str = ""
+    """A package that is not always installed."""
+
+
+def ours(method_name: str) -> Callable[[Workload], Speed]:
+    """Return the measurement of one of our own PPO-based methods under the paper's networks."""
+
+    def measure(work: Workload) -> Speed:
+        method_class: Any = load_method(method_name)
+        same = {"batch_size": work.batch_size, "minibatch_size": work.minibatch_size, "epochs": work.epochs}
+        config = replace(resolve(method_class, work.task, "paper").method, **same, kl_threshold=inf)
+        learner = method_class(Problem(load_task(work.task)), config, Streams(0)).learner
+        learner.use_cores(work.cores)
+        slots = max(1, round(work.batch_size / (learner.problem.task.horizon + 1)))
+        rollouts, updates = [], []
+        learner.collect(min(work.batch_size, 20 * slots), slots)  # Starts processes, fills caches.
+        for _ in range(work.repeats):
+            started = time.perf_counter()
+            batch = learner.collect(work.batch_size, slots)
+            collected = time.perf_counter()
+            learner.update(batch)
+            rollouts.append(batch.env_steps / (collected - started))
+            updates.append(batch.env_steps * work.epochs / (time.perf_counter() - collected))
+        speed = median(updates)
+        per_sample = operations_per_sample(method_name, work)
+        return Speed(median(rollouts), speed, peak_megabytes(), gigaflops=speed * per_sample / 1e9)
+
+    return measure
+
+
+def operations_per_sample(method_name: str, work: Workload) -> float:
+    """Return the floating-point operations of matrix products that one sample costs in one epoch.
+
+    Counted by torch on a small batch: an update of two epochs less one of a single epoch.
+    """
+    from torch.utils.flop_counter import FlopCounterMode
+
+    method_class: Any = load_method(method_name)
+    counts, steps = [], 0
+    for epochs in (1, 2):
+        same = {"batch_size": work.minibatch_size, "minibatch_size": work.minibatch_size, "epochs": epochs}
+        config = replace(resolve(method_class, work.task, "paper").method, **same, kl_threshold=inf)
+        learner = method_class(Problem(load_task(work.task)), config, Streams(0)).learner
+        batch = learner.collect(work.minibatch_size, max(1, work.minibatch_size // (load_task(work.task).horizon + 1)))
+        steps = batch.env_steps
+        with FlopCounterMode(display=False) as counter:
+            learner.update(batch)
+        counts.append(counter.get_total_flops())
+    return (counts[1] - counts[0]) / steps
+
+
+def ceiling(work: Workload) -> dict[str, float]:
+    """Return the rate of large matrix products on `work.cores` threads, 1e9 operations per second, by precision."""
+    import torch
+
+    torch.set_num_threads(work.cores)
+    rates = {}
+    for name, kind in (("fp32", torch.float32), ("bf16", torch.bfloat16)):
+        a, b = torch.ones(1024, 1024, dtype=kind), torch.ones(1024, 1024, dtype=kind)
+        torch.mm(a, b)
+        seconds = []
+        for _ in range(5):
+            started = time.perf_counter()
+            torch.mm(a, b)
+            seconds.append(time.perf_counter() - started)
+        rates[name] = 2.0 * 1024**3 / median(seconds) / 1e9
+    return rates
+
+
+def contestants() -> dict[str, Contestant]:
+    """Return everyone who can be measured, by name."""
+    from codesign_bench.benchmarks import rivals
+
+    return {
+        "gnn_ppo": Contestant("gnn_ppo, ours", ours("gnn_ppo")),
+        "shared_arch": Contestant("shared_arch, ours", ours("shared_arch")),
+        "stable_baselines3": Contestant(
+            "stable-baselines3, its vector environment", rivals.stable_baselines3_alone, "stable_baselines3"
+        ),
+        "stable_baselines3_ours": Contestant(
+            "stable-baselines3, our vector environment", rivals.stable_baselines3_batched, "stable_baselines3"
+        ),
+        "usual_way": Contestant(
+            "graph network, torch-geometric, one state a call", rivals.usual_way, "torch_geometric"
+        ),
+    }
+
+
+HEADER = ("learner", "env steps/s", "rollout", "update samples/s", "GFLOP/s", "of fp32 ceiling", "peak MB")
+
+
+def bench_learner(work: Workload, names: Sequence[str], out: Path | None, console: Console) -> None:
+    """Measure the contestants `names`, print a table, and write it to `out` as JSON, if given.
+
+    Raises:
+        UserError: more cores than there are, a task that is not known, or a file that cannot be written.
+    """
+    load_task(work.task)
+    if work.cores > available_cores():
+        raise UserError(f"--cores {work.cores}: there are only {available_cores()}")
+    known = contestants()
+    say: Callable[[str], None] = lambda line: console.print(line, markup=False, highlight=False, soft_wrap=True)  # noqa: E731
+    top = ceiling(work)
+    found: dict[str, Speed] = {}
+    for name in names:
+        say(f"measuring {known[name].title} ...")
+        try:
+            found[name] = _in_process(name, work)
+        except UserError as error:
+            say(f"left out: {error}")
+    rows = [(known[name].title, *_row(speed, work, top["fp32"])) for name, speed in found.items()]
+    print_table(console, HEADER, rows)
+    say(
+        f"{work.task}, batches of {work.batch_size:,}, minibatches of {work.minibatch_size:,}, {work.epochs} epochs, "
+        f"{work.cores} core(s), medians of {work.repeats}; matrix products: {top['fp32']:.0f} GFLOP/s in fp32, "
+        f"{top['bf16']:.0f} in bf16"
+    )
+    for name, speed in found.items():
+        if speed.how:
+            say(f"{known[name].title}: {speed.how}")
+    if out is not None:
+        _write(out, work, top, found)
+        say(str(out))
+
+
+def _row(speed: Speed, work: Workload, top: float) -> tuple[str, ...]:
+    return (
+        f"{speed.end_to_end(work.epochs):,.0f}",
+        f"{speed.rollout:,.0f}",
+        f"{speed.update:,.0f}",
+        "-" if speed.gigaflops is None else f"{speed.gigaflops:.0f}",
+        "-" if speed.gigaflops is None else f"{speed.gigaflops / top:.2f}",
+        f"{speed.peak_megabytes:.0f}",
+    )
+
+
+def _write(out: Path, work: Workload, top: Mapping[str, float], found: Mapping[str, Speed]) -> None:
+    content = {
+        "workload": asdict(work),
+        "ceiling_gigaflops": dict(top),
+        "learners": {
+            name: {**asdict(speed), "env_steps_per_second": speed.end_to_end(work.epochs)}
+            for name, speed in found.items()
+        },
+        "versions": package_versions(),
+        "host": host_facts(work.cores),
+    }
+    try:
+        write_json(out, content)
+    except OSError as error:
+        raise UserError(f"--out {out}: cannot write there ({error.strerror})") from error
+
+
+def _in_process(name: str, work: Workload) -> Speed:
+    """Measure a contestant in a process of its own.
+
+    Raises:
+        UserError: a package that it needs is not installed.
+    """
+    needs = contestants()[name].needs
+    environment = thread_environment()
+    if needs == "stable_baselines3":  # It has no other use for more cores than torch's threads.
+        environment["OMP_NUM_THREADS"] = str(work.cores)
+    command = [sys.executable, "-m", __name__, name, json.dumps(asdict(work))]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode:
+        if needs and f"No module named '{needs}'" in done.stderr:
+            raise UserError(f"{needs} is not installed: pip install 'codesign-bench[bench]'")
+        raise RuntimeError(f"measuring {name} failed:\n{done.stderr}")
+    return Speed(**json.loads(done.stdout.splitlines()[-1]))
+
+
+def peak_megabytes() -> float:
+    """Return the most memory that this process and the largest of its children ever held."""
+    usages = (resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(usages) / 1024.0
+
+
+def _main(name: str, work_json: str) -> None:
+    import torch
+
+    np.random.seed(0)  # noqa: NPY002 - the other libraries draw from the global generator
+    work = Workload(**json.loads(work_json))
+    torch.set_num_threads(int(os.environ["OMP_NUM_THREADS"]))
+    print(json.dumps(asdict(contestants()[name].measure(work))))
+
+
+if __name__ == "__main__":
+    _main(*sys.argv[1:])

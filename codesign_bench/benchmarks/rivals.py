@@ -1,0 +1,205 @@
+"""What our learners are compared with: stable-baselines3's PPO, and the graph network built the usual way.
+
+Shapes: `B` environments, `O` observation, `A` action, `N` nodes of the tool graph, `F` features of a node.
+"""
+
+from __future__ import annotations
+
+import time
+from statistics import median
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from codesign_bench.benchmarks.learner import Speed, Workload, peak_megabytes
+from codesign_bench.envs import ToolVectorEnv, environment_id, register_environments
+from codesign_bench.episodes import Episodes
+from codesign_bench.paper_tables import CMA_RL, LEARNERS
+from codesign_bench.task import Task, load_task
+
+WIDTHS = list(CMA_RL.policy_net)
+"""The perceptrons of the paper's baselines: five layers of 256."""
+USUAL_ROLLOUT_STEPS, USUAL_MINIBATCHES = 300, 3
+"""The usual way is measured over a short stretch: it is slow."""
+
+
+def stable_baselines3_alone(work: Workload) -> Speed:
+    """Measure stable-baselines3's PPO with its own vector environment, which steps one environment after another."""
+    from stable_baselines3.common.env_util import make_vec_env
+
+    register_environments()
+    return _stable_baselines3(work, make_vec_env(environment_id(work.task), n_envs=work.environments, seed=0))
+
+
+def stable_baselines3_batched(work: Workload) -> Speed:
+    """Measure stable-baselines3's PPO with our batched environments behind its interface."""
+    return _stable_baselines3(work, _batched(work))
+
+
+def _stable_baselines3(work: Workload, environments: Any) -> Speed:
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.callbacks import CallbackList
+
+    steps = work.batch_size // work.environments
+    model = PPO(
+        "MlpPolicy",
+        environments,
+        n_steps=steps,
+        batch_size=work.minibatch_size,
+        n_epochs=work.epochs,
+        policy_kwargs={"net_arch": WIDTHS},
+        device="cpu",
+        seed=0,
+    )
+    samples = steps * work.environments
+    _, callback = model._setup_learn(samples * work.repeats, CallbackList([]))
+    rollouts, updates = [], []
+    for _ in range(work.repeats):
+        started = time.perf_counter()
+        model.collect_rollouts(environments, callback, model.rollout_buffer, n_rollout_steps=steps)
+        collected = time.perf_counter()
+        model.train()
+        rollouts.append(samples / (collected - started))
+        updates.append(samples * work.epochs / (time.perf_counter() - collected))
+    return Speed(median(rollouts), median(updates), peak_megabytes())
+
+
+def _batched(work: Workload) -> Any:
+    """Return our batched environments as stable-baselines3 wants them: an episode's end begins the next at once."""
+    from stable_baselines3.common.vec_env import VecEnv
+
+    inner = ToolVectorEnv(work.task, work.environments)
+
+    class Batched(VecEnv):
+        def __init__(self) -> None:
+            super().__init__(inner.num_envs, inner.single_observation_space, inner.single_action_space)
+            self.actions: Any = None
+
+        def reset(self) -> Any:
+            return inner.reset(seed=0)[0]
+
+        def step_async(self, actions: Any) -> None:
+            self.actions = actions
+
+        def step_wait(self) -> Any:
+            observation, reward, terminated, truncated, _ = inner.step(self.actions)
+            over = terminated | truncated
+            infos: list[dict[str, Any]] = [{} for _ in range(inner.num_envs)]
+            if over.any():
+                for slot in np.flatnonzero(over):
+                    infos[slot] = {"terminal_observation": observation[slot], "TimeLimit.truncated": truncated[slot]}
+                observation = inner.reset(options={"reset_mask": over})[0]
+            return observation, reward.astype(np.float32), over, infos
+
+        def close(self) -> None:
+            pass
+
+        def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+            return [getattr(inner, attr_name, None)] * inner.num_envs
+
+        def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+            raise NotImplementedError
+
+        def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **keywords: Any) -> list[Any]:
+            raise NotImplementedError
+
+        def env_is_wrapped(
+            self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: Any = None
+        ) -> Any:
+            return [False] * inner.num_envs
+
+    return Batched()
+
+
+def usual_way(work: Workload) -> Speed:
+    """Measure the paper's networks with torch-geometric's layers on edge lists, acting on one state a call.
+
+    Minibatches are lists of single graphs, joined for every update.
+    """
+    import torch
+    from torch import nn
+    from torch_geometric.data import Batch, Data
+    from torch_geometric.nn import GraphConv
+
+    task = load_task(work.task)
+    table = LEARNERS[work.task]
+    layout, nodes = task.layout, task.tool_graph.num_nodes
+    width = layout.goal.stop + 2 + _node_width(task)
+
+    class Net(nn.Module):
+        """Linear in, graph convolutions, then a perceptron of its own for every node."""
+
+        def __init__(self, outputs: int, index_widths: tuple[int, ...]) -> None:
+            super().__init__()
+            sizes = table.control_gnn
+            self.first = nn.Linear(width, sizes[0])
+            self.convolutions = nn.ModuleList(
+                GraphConv(a, b) for a, b in zip((sizes[0], *sizes[:-1]), sizes, strict=True)
+            )
+            self.heads = nn.ModuleList()
+            for _ in range(nodes):
+                layers: list[nn.Module] = []
+                for a, b in zip((sizes[-1], *index_widths[:-1]), index_widths, strict=True):
+                    layers += [nn.Linear(a, b), nn.Tanh()]
+                self.heads.append(nn.Sequential(*layers, nn.Linear(index_widths[-1], outputs)))
+
+        def forward(self, batch: Any) -> Any:
+            x = self.first(batch.x)
+            for convolution in self.convolutions:
+                x = torch.relu(convolution(x, batch.edge_index))
+            per_node = x.view(-1, nodes, x.shape[-1])
+            return torch.stack([head(per_node[:, node]) for node, head in enumerate(self.heads)], dim=1)[:, 0]
+
+    policy, value = Net(task.control_space.size, table.control_index_mlp), Net(1, (512, 256))
+    optimizers = [torch.optim.Adam(net.parameters(), lr=1e-4) for net in (policy, value)]
+    pairs = task.tool_graph.edges + tuple((b, a) for a, b in task.tool_graph.edges)
+    edges = torch.tensor(pairs, dtype=torch.long).t().reshape(2, -1)
+
+    def graph(observation: np.ndarray) -> Any:
+        return Data(x=torch.from_numpy(_node_features(task, observation)), edge_index=edges)
+
+    episodes, slot, rng = Episodes(task, 1), np.array([0]), np.random.default_rng(0)
+    seen, over = [], True
+    started = time.perf_counter()
+    for _ in range(USUAL_ROLLOUT_STEPS):
+        if over:
+            episodes.begin(slot, task.sample_instances(rng, 1))
+            episodes.design(slot, rng.uniform(-1.0, 1.0, size=(1, task.design_space.size)))
+        state = graph(episodes.observation[0])
+        with torch.no_grad():
+            batch = Batch.from_data_list([state])
+            control, _ = policy(batch), value(batch)
+        _, terminated, truncated = episodes.control(slot, control.numpy().astype(np.float64))
+        over = bool(terminated[0] or truncated[0])
+        seen.append(state)
+    rollout = USUAL_ROLLOUT_STEPS / (time.perf_counter() - started)
+    rows = rng.integers(len(seen), size=(USUAL_MINIBATCHES, work.minibatch_size))
+    started = time.perf_counter()
+    for part in rows:
+        batch = Batch.from_data_list([seen[row] for row in part])
+        for net, optimizer in zip((policy, value), optimizers, strict=True):
+            optimizer.zero_grad()
+            net(batch).square().mean().backward()
+            optimizer.step()
+    update = USUAL_MINIBATCHES * work.minibatch_size / (time.perf_counter() - started)
+    how = f"over {USUAL_ROLLOUT_STEPS} steps and {USUAL_MINIBATCHES} minibatches, on one core, extrapolated"
+    return Speed(rollout, update, peak_megabytes(), how=how)
+
+
+def _node_width(task: Task) -> int:
+    owners = task.tool_graph.parameter_nodes
+    return max(owners.count(node) for node in range(task.tool_graph.num_nodes))
+
+
+def _node_features(task: Task, observation: np.ndarray) -> np.ndarray:
+    """Return (N, F): state, goal and phase, the same for every node, then the node's own design parameters."""
+    layout, width = task.layout, _node_width(task)
+    shared = np.concatenate([observation[: layout.goal.stop], observation[layout.phase][:2]])
+    rows = []
+    for node in range(task.tool_graph.num_nodes):
+        own = [
+            observation[layout.design][d] for d, owner in enumerate(task.tool_graph.parameter_nodes) if owner == node
+        ]
+        rows.append(np.concatenate([shared, own, np.zeros(width - len(own))]))
+    return np.array(rows, dtype=np.float32)

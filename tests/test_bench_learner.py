@@ -1,0 +1,71 @@
+"""`codesign-bench bench learner` measures what it says; how fast anything is, no test asserts."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from codesign_bench.benchmarks.learner import HEADER, Speed, Workload, contestants, operations_per_sample, ours
+from codesign_bench.cli import main
+
+SMALL = ["--batch-size", "320", "--minibatch-size", "100", "--epochs", "2", "--repeats", "1"]
+
+
+def test_end_to_end_by_hand() -> None:
+    # A step costs 1 ms to roll out and twice 0.25 ms to learn from.
+    assert Speed(rollout=1_000.0, update=4_000.0, peak_megabytes=1.0).end_to_end(epochs=2) == pytest.approx(1e3 / 1.5)
+
+
+def test_our_learners_are_measured_with_the_papers_networks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "learner.json"
+    assert main(["bench", "learner", *SMALL, "--only", "gnn_ppo", "--out", str(out)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    header = next(line for line in lines if line.startswith(HEADER[0]))
+    assert lines[lines.index(header) + 1].startswith(contestants()["gnn_ppo"].title)
+    content = json.loads(out.read_text())
+    assert content["workload"]["batch_size"] == 320
+    found = content["learners"]["gnn_ppo"]
+    assert found["env_steps_per_second"] == pytest.approx(1.0 / (1.0 / found["rollout"] + 2 / found["update"]))
+    assert 50.0 < found["peak_megabytes"] < 2_000.0
+
+
+@pytest.mark.parametrize("name", ["stable_baselines3", "stable_baselines3_ours", "usual_way"])
+def test_others_are_measured_where_they_are_installed(name: str) -> None:
+    pytest.importorskip(contestants()[name].needs)
+    work = Workload(batch_size=200, minibatch_size=100, epochs=1, repeats=1, environments=4)
+    speed = contestants()[name].measure(work)
+    assert speed.rollout > 0.0
+    assert speed.update > 0.0
+
+
+def test_the_operations_of_a_perceptron_by_hand() -> None:
+    work = Workload(batch_size=300, minibatch_size=300, epochs=1, repeats=1)
+    per_sample = operations_per_sample("shared_arch", work)
+    # Push: 10 state, 2 goal, 5 design, 2 phase inputs; five layers of 256; two numbers out, one value out. A forward
+    # pass costs two operations per weight, a backward pass twice that, but no gradient is needed for the inputs.
+    inner = 4 * 256 * 256
+    weights = (19 * 256 + inner + 256 * 2) + (19 * 256 + inner + 256 * 1)
+    expected = 6 * weights - 2 * 2 * 19 * 256
+    assert per_sample == pytest.approx(expected, rel=0.02)
+
+
+def test_the_work_is_counted_per_second() -> None:
+    work = Workload(batch_size=320, minibatch_size=160, epochs=1, repeats=1)
+    speed = ours("shared_arch")(work)
+    assert speed.gigaflops == pytest.approx(speed.update * operations_per_sample("shared_arch", work) / 1e9, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--only", "gnn_poo"], "unknown learner 'gnn_poo'; choose from: gnn_ppo"),
+        (["--epochs", "0"], "--epochs must be at least 1"),
+        (["--cores", "4096"], "--cores 4096: there are only"),
+        (["--task", "pull"], "unknown task 'pull'"),
+    ],
+)
+def test_bad_input_gets_one_line(capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:
+    assert main(["bench", "learner", *arguments]) == 2
+    assert message in capsys.readouterr().err

@@ -1,0 +1,168 @@
+"""What claims are judged on: the results folder as frames, from finished cells alone.
+
+Shapes: `N` seeds, `G` evaluation instances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from codesign_bench.claims.claim import Lacking
+from codesign_bench.errors import UserError
+from codesign_bench.profiles import DEFAULT_PROFILE
+from codesign_bench.results import find_cells, load_evaluations, load_results
+from codesign_bench.sensitivity import load_or_measure
+from codesign_bench.stats import CELL_KEYS, MIN_SEEDS
+from codesign_bench.task import load_task, task_names
+
+DEFAULT = "default"
+DESIGN_PREFIX = "design_"
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Frames that may be empty; every method that finds no data says so by `Lacking`."""
+
+    curves: pd.DataFrame = field(default_factory=pd.DataFrame)
+    """As `codesign_bench.load_results` gives them."""
+    evaluations: pd.DataFrame = field(default_factory=pd.DataFrame)
+    """As `codesign_bench.results.load_evaluations` gives them."""
+    sensitivity: pd.DataFrame = field(default_factory=pd.DataFrame)
+    """As `codesign_bench.sensitivity.measure` gives it, several tasks below each other."""
+    outside: pd.DataFrame = field(default_factory=pd.DataFrame)
+    """As `codesign_bench.outside.load_or_measure` gives it."""
+    design_widths: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """Task -> column of a design parameter in `evaluations` -> width of its range, in the parameter's unit."""
+    profile: str = DEFAULT_PROFILE
+    """The profile that the cells were run with, if it is the same for all, so that what is missing can match them."""
+
+    def instances(self, task: str, method: str, variant: str = DEFAULT) -> pd.DataFrame:
+        """Return the final evaluation of the finished cells of one method, task and variant, one row per instance.
+
+        Raises:
+            Lacking: there are fewer than `MIN_SEEDS` finished seeds.
+        """
+        rows = _select(self.evaluations, task, method, variant)
+        seeds = rows["seed"].nunique() if len(rows) else 0
+        if seeds < MIN_SEEDS:
+            told = f"{seeds} finished seed{'' if seeds == 1 else 's'}"
+            raise Lacking(f"{told} of {task}/{method}/{variant}; {MIN_SEEDS} are needed")
+        return rows
+
+    def final_returns(self, task: str, method: str, variant: str = DEFAULT) -> np.ndarray:
+        """Return the mean return over evaluation instances at the end of training, (N,).
+
+        Raises:
+            Lacking: as `instances` does.
+        """
+        return self.instances(task, method, variant).groupby("seed")["return"].mean().to_numpy()
+
+    def curve(self, task: str, method: str, variant: str = DEFAULT) -> pd.DataFrame:
+        """Return the learning curves of the finished cells of one method, task and variant.
+
+        Raises:
+            Lacking: as `instances` does, or a finished cell lacks its curve.
+        """
+        finished = self.instances(task, method, variant)["seed"].unique()
+        rows = _select(self.curves, task, method, variant)
+        if not len(rows) or not set(finished) <= set(rows["seed"]):
+            raise Lacking(f"a finished cell of {task}/{method}/{variant} has no curve")
+        return rows[rows["seed"].isin(finished)]
+
+    def budget(self, task: str, method: str, variant: str = DEFAULT) -> float:
+        """Return the mean environment steps at the end of training over finished seeds.
+
+        Raises:
+            Lacking: as `curve` does.
+        """
+        return float(self.curve(task, method, variant).groupby("seed")["env_steps"].max().mean())
+
+
+def _select(frame: pd.DataFrame, task: str, method: str, variant: str) -> pd.DataFrame:
+    """Return the rows of one method, task and variant."""
+    if frame.empty:
+        return frame
+    wanted = pd.Series(True, index=frame.index)
+    for column, value in zip(CELL_KEYS, (task, method, variant), strict=True):
+        wanted &= frame[column] == value
+    return frame[wanted]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What is not in the cells: read from tables beside them, or measured where it is missing."""
+
+    missing: bool = False
+    """Whether to measure what is missing; it takes minutes."""
+    outside: Sequence[tuple[str, str]] = ()
+    """Tasks and methods whose policies are played outside the training region."""
+    say: Callable[[str], None] = lambda line: None
+    """Tells the user a line."""
+
+    def sensitivity(self, results: Path) -> pd.DataFrame:
+        """Return the design-sensitivity tables."""
+        return load_or_measure(results, self.say, self.missing)
+
+    def outside_region(self, results: Path) -> pd.DataFrame:
+        """Return what policies reach outside the region."""
+        from codesign_bench.outside import load_or_measure as load_or_play
+
+        return load_or_play(results, self.outside, self.say, self.missing)
+
+
+def load_evidence(results: Path, measure: Measure | None = None) -> Evidence:
+    """Read everything that claims are judged on from a results folder.
+
+    Args:
+        results: the folder.
+        measure: what to measure beforehand with finished policies and scripts, where it is missing; None: nothing.
+
+    Raises:
+        UserError: there is no such folder, or it holds neither a finished cell nor a design-sensitivity table.
+    """
+    profiles = {str(content.get("profile", DEFAULT_PROFILE)) for _, content in find_cells(results)}
+    curves = _read(load_results, results, ("return_mean", "success_rate"))
+    evaluations = _read(load_evaluations, results, ("return", "success", "material", "effort"))
+    what = measure or Measure()
+    sensitivity = _read(what.sensitivity, results, ("tool", "goal", "success"))
+    outside = _read(what.outside_region, results, ("task", "method", "seed", "instance", "success"))
+    if evaluations.empty and sensitivity.empty:
+        raise UserError(f"no finished cell in '{results}' yet; make some with: codesign-bench run --out {results}")
+    profile = profiles.pop() if len(profiles) == 1 else DEFAULT_PROFILE
+    return Evidence(curves, evaluations, sensitivity, outside, _design_widths(evaluations), profile)
+
+
+def _read(read: Callable[[Path], pd.DataFrame], results: Path, needed: Sequence[str]) -> pd.DataFrame:
+    """Return a frame, empty where there is none: the claims that need it will say so.
+
+    Raises:
+        UserError: the frame lacks a value in a column of `needed`.
+    """
+    try:
+        frame = read(results)
+    except UserError:
+        return pd.DataFrame()
+    except (ValueError, TypeError, KeyError, OSError) as error:
+        raise UserError(f"cannot read a table in '{results}': {' '.join(str(error).split())}") from error
+    for column in needed:
+        if column not in frame.columns or frame[column].isna().any():
+            raise UserError(f"a table in '{results}' is damaged or none of ours: it lacks values of '{column}'")
+    return frame
+
+
+def _design_widths(evaluations: pd.DataFrame) -> dict[str, dict[str, float]]:
+    """Return the ranges of the design parameters of the known tasks in `evaluations`."""
+    present = set(evaluations["task"]) if len(evaluations) else set()
+    widths = {}
+    for name in task_names():
+        if name in present:
+            space = load_task(name).design_space
+            low, high = space.bounds
+            pairs = zip(space.names, (high - low).tolist(), strict=True)
+            widths[name] = {f"{DESIGN_PREFIX}{parameter}": width for parameter, width in pairs}
+    return widths

@@ -1,0 +1,82 @@
+"""Rules about tools and goals.
+
+Shapes: `N` seeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from codesign_bench.claims.claim import CONTRADICTED, SUPPORTED, Finding, Lacking, Rule, above
+from codesign_bench.claims.evidence import Evidence
+from codesign_bench.claims.shared import OVER_SEEDS, estimate, mean, run_command, seeds_of
+
+GOAL_SHARE = 0.1
+"""Share of the variance of tools that goals must make for tools to vary with the goal (ours)."""
+FEWEST_TOOLS = 50
+"""Tools that must have been tried before their failing says something of tools at large (ours)."""
+
+
+def tools_vary(task: str, method: str, seeds: int) -> Rule:
+    """Return the rule for "`method` makes other tools for other goals of `task`"."""
+
+    def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
+        rows = evidence.instances(task, method)
+        if task not in evidence.design_widths:
+            raise Lacking(f"the task '{task}' is not known here")
+        shares = goal_shares(rows, evidence.design_widths[task])
+        value, low, high = estimate([shares], mean, rng)
+        return Finding(above(low, high, GOAL_SHARE), value, low, high, seeds_of(shares))
+
+    return Rule(
+        kind="tools vary with the goal",
+        statistic="variance of designs over goals, as a share of their variance over goals and seeds",
+        words=f"supported if {OVER_SEEDS} lies above {GOAL_SHARE:g}, contradicted if below {GOAL_SHARE:g}",
+        needs=(run_command("all", task, seeds),),
+        judge=judge,
+    )
+
+
+def goal_shares(rows: pd.DataFrame, widths: Mapping[str, float]) -> np.ndarray:
+    """Return (N,): each seed's variance of designs over goals, divided by the variance over all goals and seeds.
+
+    Variances are summed over design parameters, each measured in widths of its range; without any variance it is 0.
+
+    Args:
+        rows: one row per seed and goal, with the columns named in `widths`.
+        widths: column of a design parameter -> width of its range.
+    """
+    columns = [column for column, width in widths.items() if width > 0.0]
+    units = rows[columns] / [widths[column] for column in columns]
+    total = float(units.var(ddof=0).sum())
+    within = units.groupby(rows["seed"]).var(ddof=0).sum(axis=1).to_numpy()
+    return within / total if total > 0.0 else np.zeros_like(within)
+
+
+def no_single_tool(task: str) -> Rule:
+    """Return the rule for "no single tool solves every goal of `task`"."""
+
+    def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
+        del rng  # one goal that a tool fails is enough: nothing is estimated from a sample
+        frame = evidence.sensitivity
+        rows = frame[frame["task"] == task] if len(frame) else frame
+        if rows.empty:
+            raise Lacking(f"the design sensitivity of {task} is not measured")
+        solved = rows.pivot(index="tool", columns="goal", values="success") > 0
+        solvable = solved.loc[:, solved.any()]
+        if len(solved) < FEWEST_TOOLS or solvable.shape[1] < 2:
+            raise Lacking(f"{len(solved)} tools and {solvable.shape[1]} goals that any of them solves are too few")
+        best = float(solvable.mean(axis=1).max())
+        n = f"{len(solved)} tools, {solvable.shape[1]} of {solved.shape[1]} goals"
+        return Finding(SUPPORTED if best < 1.0 else CONTRADICTED, best, n=n, note="one controller, written by hand")
+
+    return Rule(
+        kind="no single tool",
+        statistic="largest share that one tool solves of the goals that some tool solves",
+        words=f"supported if it is below 1, contradicted if it is 1, over at least {FEWEST_TOOLS} tools; no interval",
+        needs=("codesign-bench plot design_sensitivity --results {results}",),
+        judge=judge,
+    )

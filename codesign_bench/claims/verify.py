@@ -1,0 +1,185 @@
+"""Judge claims on results, and write the table: printed, as Markdown and as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from codesign_bench import __version__, stats
+from codesign_bench.claims.claim import UNDECIDED, VERDICTS, Claim, Finding, Lacking
+from codesign_bench.claims.evidence import Evidence, Measure, load_evidence
+from codesign_bench.claims.paper import CLAIMS, OUTSIDE
+from codesign_bench.errors import UserError
+from codesign_bench.files import write_bytes, write_json
+from codesign_bench.profiles import DEFAULT_PROFILE
+from codesign_bench.progress import print_table
+from codesign_bench.seeding import generator
+from codesign_bench.text_tables import markdown
+
+MARKDOWN_FILE, JSON_FILE = "claims.md", "claims.json"
+SEED = 0
+"""Of the bootstrap; each claim has a stream of its own, so that a new claim never moves another's interval."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A claim beside what was found."""
+
+    claim: Claim
+    finding: Finding
+    needs: tuple[str, ...] = ()
+    """Commands that make the missing data; empty where none are missing."""
+
+    @property
+    def interval(self) -> str:
+        """The statistic with its interval, as text."""
+        if math.isnan(self.finding.value):
+            return "-"
+        value = _number(self.finding.value)
+        if math.isnan(self.finding.low):
+            return value
+        return f"{value} [{_number(self.finding.low)}, {_number(self.finding.high)}]"
+
+
+def judge(claims: Sequence[Claim], evidence: Evidence, results: str) -> list[Row]:
+    """Judge each claim; `results` is the folder that commands for missing data name."""
+    return [_row(claim, evidence, results) for claim in claims]
+
+
+def _row(claim: Claim, evidence: Evidence, results: str) -> Row:
+    try:
+        return Row(claim, claim.rule.judge(evidence, generator(SEED, f"claim {claim.name}")))
+    except Lacking as lacking:
+        profile = "" if evidence.profile == DEFAULT_PROFILE else f" --profile {evidence.profile}"
+        needs = tuple(command.format(results=results, profile=profile) for command in claim.rule.needs)
+        return Row(claim, Finding(UNDECIDED, math.nan, note=str(lacking)), needs)
+
+
+def verify(results: Path, out: Path, console: Console, *, measure: bool = False) -> None:
+    """Judge the paper's claims on the results folder, print the table and write it into `out`.
+
+    With `measure`, tools and policies are first played where claims need outcomes that no cell holds; it takes minutes.
+
+    Raises:
+        UserError: there are no results, they cannot be read, or `out` cannot be written.
+    """
+
+    def say(line: str) -> None:
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+    evidence = load_evidence(results, Measure(measure, OUTSIDE, say))
+    rows = judge(CLAIMS, evidence, str(results))
+    paths = write_rows(rows, results, out)
+    print_rows(rows, console)
+    for path in paths:
+        console.print(str(path), markup=False, highlight=False, soft_wrap=True)
+
+
+def print_rows(rows: Sequence[Row], console: Console) -> None:
+    """Print one line per claim, those without data last, then the counts and what would make the missing data."""
+    ordered = sorted(rows, key=lambda row: bool(row.needs))
+    table = [(row.finding.verdict, row.claim.name, row.interval, row.finding.n, row.finding.note) for row in ordered]
+    print_table(console, ("verdict", "claim", "statistic [95 % interval]", "n", "note"), table)
+    for line in (summary(rows), *(f"needs: {command}" for command in missing(rows))):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """Return the counts of verdicts as a line."""
+    counts = Counter(row.finding.verdict for row in rows)
+    lacking = sum(bool(row.needs) for row in rows)
+    told = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS)
+    return f"{len(rows)} claims: {told} ({lacking} of them for lack of data)"
+
+
+def missing(rows: Sequence[Row]) -> list[str]:
+    """Return the commands that make all missing data, each once."""
+    return list(dict.fromkeys(command for row in rows for command in row.needs))
+
+
+def write_rows(rows: Sequence[Row], results: Path, out: Path) -> list[Path]:
+    """Write the rows as Markdown and JSON into `out` and return the paths.
+
+    Raises:
+        UserError: `out` cannot be written.
+    """
+    paths = [out / JSON_FILE, out / MARKDOWN_FILE]
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        write_json(paths[0], as_json(rows, results))
+        write_bytes(paths[1], as_markdown(rows, results).encode())
+    except OSError as error:
+        raise UserError(f"--out {out}: cannot write there ({error.strerror})") from error
+    return paths
+
+
+def as_json(rows: Sequence[Row], results: Path) -> dict[str, Any]:
+    """Return everything that is known of each claim, as JSON values; what is not finite is None or text."""
+    return {
+        "version": __version__,
+        "results": str(results),
+        "interval": {"kind": "percentile bootstrap", "confidence": stats.CONFIDENCE, "resamples": stats.RESAMPLES},
+        "claims": [
+            {
+                "name": row.claim.name,
+                "sentence": row.claim.sentence,
+                "source": row.claim.source,
+                "rule": row.claim.rule.kind,
+                "statistic": row.claim.rule.statistic,
+                "words": row.claim.rule.words,
+                "verdict": row.finding.verdict,
+                "value": _json_number(row.finding.value),
+                "low": _json_number(row.finding.low),
+                "high": _json_number(row.finding.high),
+                "n": row.finding.n,
+                "note": row.finding.note,
+                "needs": list(row.needs),
+            }
+            for row in rows
+        ],
+    }
+
+
+def as_markdown(rows: Sequence[Row], results: Path) -> str:
+    """Return the page: the table of claims, the rules that judged them, and the commands for missing data."""
+    header = ("claim", "verdict", "statistic [95 % interval]", "n", "rule", "source", "note")
+    table = [
+        (
+            row.claim.sentence,
+            f"*{row.finding.verdict}*",
+            row.interval,
+            row.finding.n,
+            row.claim.rule.kind,
+            row.claim.source,
+            "; ".join([row.finding.note, *(f"needs: `{command}`" for command in row.needs)]),
+        )
+        for row in rows
+    ]
+    rules = {row.claim.rule.kind: (row.claim.rule.statistic, row.claim.rule.words) for row in rows}
+    parts = [
+        "# What the results say of the paper's claims\n",
+        f"Results: `{results}`. {summary(rows)}. Intervals are 95 % percentile bootstrap intervals over seeds "
+        f"({stats.RESAMPLES:,} resamples); below {stats.MIN_SEEDS} seeds there is none and nothing is decided.\n",
+        markdown(header, table),
+        "## Rules\n",
+        markdown(("rule", "statistic", "verdict"), [(kind, *words) for kind, words in rules.items()]),
+    ]
+    if missing(rows):
+        parts += ["## Data that are missing\n", "```\n" + "\n".join(missing(rows)) + "\n```\n"]
+    return "\n".join(parts)
+
+
+def _number(value: float) -> str:
+    return f"{value:.2f}" if math.isfinite(value) else ("never" if value > 0.0 else "-inf")
+
+
+def _json_number(value: float) -> float | str | None:
+    if math.isfinite(value):
+        return value
+    return None if math.isnan(value) else ("inf" if value > 0.0 else "-inf")

@@ -1,0 +1,205 @@
+"""`codesign-bench verify`: a row per claim, printed and written, and bad input answered in a line."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from codesign_bench import cli
+from codesign_bench.claims.claim import SUPPORTED, UNDECIDED, VERDICTS, Claim, Finding, Lacking, Rule
+from codesign_bench.claims.evidence import Evidence, load_evidence
+from codesign_bench.claims.paper import CLAIMS
+from codesign_bench.claims.verify import as_json, as_markdown, judge, missing, summary
+from codesign_bench.errors import UserError
+from codesign_bench.results import CURVE_COLUMNS, write_cell, write_rows
+
+ROOT = Path(__file__).resolve().parents[2]
+REFERENCE = ROOT / "results" / "reference"
+
+
+def make_cell(out: Path, method: str, seed: int, final: float, **changes: Any) -> Path:
+    """Write a finished cell of push that rises from 0 to `final`, and return its folder."""
+    content = {
+        "status": "done",
+        "task": "push",
+        "method": method,
+        "variant": "default",
+        "cutout": None,
+        "alpha": None,
+        "seed": seed,
+        "profile": "quick",
+        "config": {},
+        **changes,
+    }
+    folder = out / "push" / method / str(content["variant"]) / f"seed-{seed:02d}"
+    folder.mkdir(parents=True)
+    write_cell(folder, content)
+    zeros = dict.fromkeys(CURVE_COLUMNS, 0.0)
+    write_rows(folder / "curve.csv", [{**zeros, "env_steps": 0}, {**zeros, "env_steps": 100, "return_mean": final}])
+    row = {"return": final, "success": 0, "episode_length": 5, "material": 0.5, "effort": 0.5}
+    lengths = {f"design_link_{link}_length": 1.0 for link in (1, 2, 3)}
+    angles = {f"design_joint_{joint}_angle": 0.0 for joint in (1, 2)}
+    write_rows(folder / "evaluation.csv", [{**row, **lengths, **angles}] * 2)
+    return folder
+
+
+def make_results(out: Path) -> None:
+    """Write three seeds each of two methods, all of one tool."""
+    for seed in range(3):
+        make_cell(out, "gnn_ppo", seed, 2.0)
+        make_cell(out, "cma_rl", seed, 1.0)
+
+
+def claim(name: str, finding: Finding | None) -> Claim:
+    """Return a claim that comes out as `finding`, or lacks data where it is None."""
+
+    def found(evidence: Evidence, rng: np.random.Generator) -> Finding:
+        if finding is None:
+            raise Lacking("nothing there")
+        return finding
+
+    return Claim(
+        name, f"sentence of {name}", "section", Rule("kind", "number", "words", ("make {results}{profile}",), found)
+    )
+
+
+def test_verify_prints_and_writes_a_row_for_each_claim(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    results, out = tmp_path / "runs", tmp_path / "claims"
+    make_results(results)
+    assert cli.main(["verify", "--results", str(results), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    rows = {line.split()[1]: line for line in printed if line.split()[0] in VERDICTS}
+    assert set(rows) == {claim.name for claim in CLAIMS}
+    assert (
+        " ".join(rows["final_return.push.cma_rl"].split()[:5]) == "supported final_return.push.cma_rl 1.00 [1.00, 1.00]"
+    )
+    assert rows["steps.push.cma_rl"].split()[2] == "0.50"
+    assert rows["tools_vary.push"].startswith("contradicted")
+    assert rows["final_return.push.cma_es"].startswith("undecided")
+    assert printed[-2:] == [str(out / "claims.json"), str(out / "claims.md")]
+
+    content = json.loads((out / "claims.json").read_text())
+    written = {row["name"]: row for row in content["claims"]}
+    assert set(written) == set(rows)
+    assert written["final_return.push.cma_rl"]["value"] == pytest.approx(1.0)
+    assert written["final_return.push.cma_rl"]["verdict"] == "supported"
+    assert written["final_return.push.cma_es"]["value"] is None
+    page = (out / "claims.md").read_text()
+    assert all(claim.sentence in page for claim in CLAIMS)
+
+
+def test_missing_data_are_named_with_the_command_that_makes_them_alike(tmp_path: Path) -> None:
+    make_results(tmp_path)
+    rows = {row.claim.name: row for row in judge(CLAIMS, load_evidence(tmp_path), str(tmp_path))}
+    lacking = rows["final_return.push.cma_es"]
+    assert lacking.finding.note == "0 finished seeds of push/cma_es/default; 3 are needed"
+    (command,) = lacking.needs
+    assert command == f"codesign-bench run --method all --task push --seeds 6 --profile quick --out {tmp_path}"
+    assert rows["final_return.push.cma_rl"].needs == ()
+
+
+def test_the_commands_for_missing_data_are_understood(tmp_path: Path) -> None:
+    make_results(tmp_path)
+    commands = missing(judge(CLAIMS, load_evidence(tmp_path), str(tmp_path)))
+    assert len(commands) == len(set(commands)) > 5
+    for command in commands:
+        options = cli.build_parser().parse_args(command.split()[1:])
+        if options.command is cli._run:
+            cli._check_run(options)
+
+
+def test_claims_of_each_verdict_are_counted_and_told() -> None:
+    claims = [
+        claim("one", Finding(SUPPORTED, 1.0, 0.5, 1.5, n="3 seeds", note="so be it")),
+        claim("two", Finding(UNDECIDED, 2.0, 0.0, float("inf"), n="3 seeds")),
+        claim("three", None),
+    ]
+    rows = judge(claims, Evidence(), "here")
+    assert summary(rows) == "3 claims: 1 supported, 0 contradicted, 2 undecided (1 of them for lack of data)"
+    assert [row.interval for row in rows] == ["1.00 [0.50, 1.50]", "2.00 [0.00, never]", "-"]
+    assert missing(rows) == ["make here"]
+    page = as_markdown(rows, Path("here"))
+    assert "| sentence of one | *supported* | 1.00 [0.50, 1.50] | 3 seeds | kind | section | so be it |" in page
+    assert "nothing there; needs: `make here`" in page
+    one, two, three = as_json(rows, Path("here"))["claims"]
+    assert (one["value"], one["low"], one["high"]) == (1.0, 0.5, 1.5)
+    assert (two["high"], three["value"], three["needs"]) == ("inf", None, ["make here"])
+
+
+def test_a_new_claim_moves_no_other_interval() -> None:
+    def drawn(evidence: Evidence, rng: np.random.Generator) -> Finding:
+        return Finding(UNDECIDED, float(rng.random()))
+
+    first, second = (Claim(name, "", "", Rule("", "", "", (), drawn)) for name in ("first", "second"))
+    values = [row.finding.value for row in judge([first, second], Evidence(), "")]
+    assert values[0] != values[1]
+    assert [row.finding.value for row in judge([second], Evidence(), "")] == values[1:]
+
+
+def test_names_of_claims_are_unique_and_commands_have_their_places() -> None:
+    names = [claim.name for claim in CLAIMS]
+    assert len(names) == len(set(names))
+    for entry in CLAIMS:
+        assert entry.rule.needs
+        assert all("{results}" in command for command in entry.rule.needs)
+
+
+def test_the_page_on_claims_tells_every_rule_in_the_same_words() -> None:
+    page = (ROOT / "docs" / "claims.md").read_text()
+    told = set(re.findall(r"^\| (.+) \| (.+) \| (.+) \|$", page, re.MULTILINE))
+    assert {(claim.rule.kind, claim.rule.statistic, claim.rule.words) for claim in CLAIMS} <= told
+
+
+@pytest.mark.skipif(not REFERENCE.exists(), reason="a source distribution leaves the results out")
+def test_the_shipped_results_decide_what_they_can() -> None:
+    rows = {row.claim.name: row for row in judge(CLAIMS, load_evidence(REFERENCE), "results/reference")}
+    final = rows["final_return.push.cma_rl"].finding
+    # Means over six seeds as in the table of the reference results: 1.31 and 0.86.
+    assert (final.value, final.n) == (pytest.approx(1.31 - 0.86, abs=0.01), "6 and 6 seeds")
+    decided = {name for name, row in rows.items() if not row.needs}
+    # Push has six seeds of every method: all that compares methods there is decided.
+    assert {name for name in rows if name.startswith(("final_return.push.", "steps.push."))} <= decided
+    assert {f"no_single_tool.{table.stem}" for table in REFERENCE.glob("design_sensitivity/*.csv")} <= decided
+
+
+@pytest.mark.parametrize(
+    ("damage", "told"),
+    [
+        (lambda folder: (folder / "evaluation.csv").write_text("somebody,else\n1,2\n"), "lacks values of 'return'"),
+        (lambda folder: (folder / "evaluation.csv").write_text('a,b\n1,2,3\n"'), "cannot read a table"),
+        (lambda folder: (folder / "evaluation.csv").write_text(""), "cannot read a table"),
+    ],
+)
+def test_damaged_results_are_refused_in_a_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], damage: Any, told: str
+) -> None:
+    make_results(tmp_path)
+    damage(tmp_path / "push" / "gnn_ppo" / "default" / "seed-01")
+    assert cli.main(["verify", "--results", str(tmp_path), "--out", str(tmp_path / "claims")]) == 2
+    error = capsys.readouterr().err
+    assert told in error
+    assert error.count("\n") == 1
+
+
+def test_other_bad_input_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    for results in (tmp_path / "nowhere", tmp_path):
+        assert cli.main(["verify", "--results", str(results), "--out", str(tmp_path / "claims")]) == 2
+        assert str(results) in capsys.readouterr().err
+    make_results(tmp_path / "runs")
+    assert cli.main(["verify", "--results", str(tmp_path / "runs"), "--out", str(tmp_path / "file" / "claims")]) == 2
+    assert "cannot write" in capsys.readouterr().err
+    with pytest.raises(UserError, match="nowhere"):
+        load_evidence(tmp_path / "nowhere")
+
+
+def test_unfinished_and_failed_cells_do_not_count(tmp_path: Path) -> None:
+    make_results(tmp_path)
+    make_cell(tmp_path, "gnn_ppo", 3, 99.0, status="failed")
+    make_cell(tmp_path, "gnn_ppo", 4, 99.0, status="running")
+    assert load_evidence(tmp_path).final_returns("push", "gnn_ppo").tolist() == [2.0, 2.0, 2.0]

@@ -14,13 +14,15 @@ from rich.console import Console
 from codesign_bench import __version__
 from codesign_bench.config import parse_int
 from codesign_bench.errors import UserError, unknown_name
-from codesign_bench.profiles import DEFAULT_PROFILE, check_fractions
+from codesign_bench.profiles import DEFAULT_PROFILE, DEVICES, PRECISIONS, check_fractions
 from codesign_bench.registry import import_modules, names
 
 PROGRAM = "codesign-bench"
 EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
 DEFAULT_RESULTS = Path("results/runs")
 DEFAULT_FIGURES = Path("results/figures")
+DEFAULT_CLAIMS = Path("results/claims")
+DEFAULT_REPORT = Path("results/report.html")
 ALL = "all"
 
 
@@ -66,6 +68,11 @@ def build_parser() -> argparse.ArgumentParser:
     _add_run(_add(commands, "run", "train and evaluate: method x task x variant x seed", _run))
     _add_status(_add(commands, "status", "what a results folder holds and how far it is", _status))
     _add_plot(_add(commands, "plot", "draw the figures that the results allow", _plot))
+    _add_verify(_add(commands, "verify", "which of the paper's claims the results support", _verify))
+    _add_report(_add(commands, "report", "write one page that tells everything a results folder holds", _report))
+    _add_reproduce(_add(commands, "reproduce", "run what figures of the paper need, then draw them", _reproduce))
+    _add_render(_add(commands, "render", "draw what a policy does, as an animation or a picture", _render))
+    _add_bench(_add(commands, "bench", "measure speed on this machine", _bench))
     return parser
 
 
@@ -112,6 +119,24 @@ def _add_config(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _overrides(options: argparse.Namespace) -> list[str]:
+    """Return the `--set` entries, and those that stand for --device and --precision, where a method has any use."""
+    from dataclasses import fields
+
+    from codesign_bench.host import computes_in_bfloat16
+    from codesign_bench.method import load_method
+
+    result = list(options.overrides)
+    if options.device is not None:
+        result.append(f"device={options.device}")
+    if options.precision is not None:
+        chosen = "bf16" if options.precision == "auto" and computes_in_bfloat16() else "fp32"
+        methods = _names("methods", options.method, _paper_methods())
+        keys = {field.name for name in methods for field in fields(load_method(name).config_class)}
+        result += [f"precision={chosen}"] if "precision" in keys else []
+    return result
+
+
 def _add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--method", required=True, nargs="+", metavar="M", help="names, or all: the paper's five")
     parser.add_argument("--task", required=True, nargs="+", metavar="T", help="names, or all")
@@ -119,10 +144,20 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
     _add_config(parser)
     parser.add_argument("--cutout", nargs="+", type=float, default=[], metavar="F", help="fractions never trained on")
     parser.add_argument("--alpha", nargs="+", type=float, default=[], metavar="A", help="trade-off coefficients")
+    parser.add_argument(
+        "--finetune", nargs="+", type=_whole_number, default=[], metavar="N", help="go on with such instances alone"
+    )
+    parser.add_argument(
+        "--scratch", nargs="+", type=_whole_number, default=[], metavar="N", help="learn such instances from scratch"
+    )
     parser.add_argument("--jobs", type=_whole_number, metavar="N", help="cells at a time; default: as many as cores")
-    parser.add_argument("--device", default="cpu", choices=("cpu", "cuda"))
+    parser.add_argument("--device", choices=DEVICES, help="where networks are updated; default: cpu")
+    parser.add_argument(
+        "--precision", choices=PRECISIONS, help="auto: bfloat16 in updates where the processor has it; default: fp32"
+    )
     parser.add_argument("--out", type=Path, default=DEFAULT_RESULTS, metavar="DIR", help=f"default: {DEFAULT_RESULTS}")
-    parser.add_argument("--backend", default="loky", choices=("loky", "dask"))
+    parser.add_argument("--backend", default="loky", choices=("loky", "dask"), help="default: loky, this machine")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster; without, --backend dask starts one")
     parser.add_argument("--retry-failed", action="store_true", help="run failed cells again")
 
 
@@ -134,6 +169,55 @@ def _add_plot(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("figures", nargs="*", metavar="FIGURE", help="default: every figure that the results allow")
     parser.add_argument("--results", type=Path, default=DEFAULT_RESULTS, metavar="DIR")
     parser.add_argument("--out", type=Path, default=DEFAULT_FIGURES, metavar="DIR", help=f"default: {DEFAULT_FIGURES}")
+
+
+def _add_verify(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--results", type=Path, default=DEFAULT_RESULTS, metavar="DIR")
+    parser.add_argument("--out", type=Path, default=DEFAULT_CLAIMS, metavar="DIR", help=f"default: {DEFAULT_CLAIMS}")
+    parser.add_argument(
+        "--measure", action="store_true", help="first play tools and policies where claims need it; takes minutes"
+    )
+
+
+def _add_report(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--results", type=Path, default=DEFAULT_RESULTS, metavar="DIR")
+    parser.add_argument("--out", type=Path, default=DEFAULT_REPORT, metavar="FILE", help=f"default: {DEFAULT_REPORT}")
+
+
+def _add_reproduce(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("experiments", nargs="*", metavar="FIGURE", help="names, or all (default)")
+    parser.add_argument("--profile", default=DEFAULT_PROFILE, help=f"default: {DEFAULT_PROFILE}")
+    parser.add_argument("--seeds", type=_whole_number, metavar="N", help="seeds of every cell, instead of the paper's")
+    parser.add_argument("--jobs", type=_whole_number, metavar="N", help="cells at a time; default: as many as cores")
+    parser.add_argument("--out", type=Path, default=DEFAULT_RESULTS, metavar="DIR", help=f"default: {DEFAULT_RESULTS}")
+    parser.add_argument("--figures", type=Path, default=DEFAULT_FIGURES, metavar="DIR", help="where figures go")
+
+
+def _add_render(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--task", metavar="T", help="default: the task of --policy")
+    parser.add_argument("--policy", type=Path, metavar="CELL", help="a finished cell's folder; its final policy acts")
+    parser.add_argument(
+        "--behaviour", choices=("random", "script"), help="what acts without --policy; default: the task's script"
+    )
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="ends in .gif or .png")
+    parser.add_argument("--episodes", type=_whole_number, default=4, metavar="N", help="default: 4")
+    parser.add_argument("--seed", type=_whole_number, default=0, help="of random behaviour; default: 0")
+
+
+def _add_bench(parser: argparse.ArgumentParser) -> None:
+    kinds = parser.add_subparsers(required=True, metavar="tasks|learner", dest="what")
+    tasks = kinds.add_parser("tasks", help="environment steps beside the raw engine", allow_abbrev=False)
+    tasks.add_argument("--task", nargs="+", default=[ALL], metavar="T", help="names, or all (default)")
+    tasks.add_argument("--seconds", type=float, default=5.0, metavar="S", help="for each; default: 5")
+    learner = kinds.add_parser("learner", help="our learners beside others'", allow_abbrev=False)
+    learner.add_argument("--task", default="push", metavar="T", help="default: push")
+    learner.add_argument("--cores", type=_whole_number, default=1, metavar="N", help="default: 1")
+    learner.add_argument("--batch-size", type=_whole_number, default=50_000, metavar="N", help="default: 50000")
+    learner.add_argument("--minibatch-size", type=_whole_number, default=2_000, metavar="N", help="default: 2000")
+    learner.add_argument("--epochs", type=_whole_number, default=10, metavar="N", help="default: 10")
+    learner.add_argument("--repeats", type=_whole_number, default=3, metavar="N", help="default: 3")
+    learner.add_argument("--only", nargs="+", metavar="NAME", help="some of the learners; default: all")
+    learner.add_argument("--out", type=Path, metavar="FILE", help="write the numbers there as JSON")
 
 
 # The commands import what they need when they run, so that `list` and `--help` need neither torch nor pandas.
@@ -178,14 +262,24 @@ def _run(options: argparse.Namespace, console: Console) -> int:
             seeds=parse_seeds(options.seeds),
             cutouts=list(dict.fromkeys(options.cutout)),
             alphas=list(dict.fromkeys(options.alpha)),
+            finetunes=list(dict.fromkeys(options.finetune)),
+            scratches=list(dict.fromkeys(options.scratch)),
             profile=options.profile,
             steps=options.steps,
-            overrides=options.overrides,
+            overrides=_overrides(options),
         )
     )
     check_cells(cells)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a polite kill is a Ctrl-C
-    return run_sweep(cells, options.out, console=console, jobs=options.jobs, retry_failed=options.retry_failed)
+    return run_sweep(
+        cells,
+        options.out,
+        console=console,
+        jobs=options.jobs,
+        retry_failed=options.retry_failed,
+        backend=options.backend,
+        scheduler=options.scheduler,
+    )
 
 
 def _status(options: argparse.Namespace, console: Console) -> int:
@@ -198,10 +292,105 @@ def _status(options: argparse.Namespace, console: Console) -> int:
 def _plot(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.plotting import draw_figures
 
+    draw_figures(options.figures, options.results, options.out, _printer(console))
+    return 0
+
+
+def _report(options: argparse.Namespace, console: Console) -> int:
+    from codesign_bench.report.page import write_report
+
+    write_report(options.results, options.out, _printer(console))
+    return 0
+
+
+def _printer(console: Console) -> Callable[[str], None]:
+    """Return a function that prints a line as it is."""
+
     def say(line: str) -> None:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
 
-    draw_figures(options.figures, options.results, options.out, say)
+    return say
+
+
+def _reproduce(options: argparse.Namespace, console: Console) -> int:
+    from codesign_bench.profiles import run_profile
+    from codesign_bench.reproduce import reproduce
+
+    run_profile(options.profile, "push")  # refuses an unknown profile before anything runs
+    for name in ("seeds", "jobs"):
+        if getattr(options, name) is not None and getattr(options, name) < 1:
+            raise UserError(f"--{name} must be at least 1, not {getattr(options, name)}")
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a polite kill is a Ctrl-C
+    return reproduce(
+        options.experiments,
+        profile=options.profile,
+        results=options.out,
+        figures=options.figures,
+        console=console,
+        jobs=options.jobs,
+        seeds=options.seeds,
+    )
+
+
+def _verify(options: argparse.Namespace, console: Console) -> int:
+    from codesign_bench.claims.verify import verify
+
+    verify(options.results, options.out, console, measure=options.measure)
+    return 0
+
+
+def _render(options: argparse.Namespace, console: Console) -> int:
+    from codesign_bench.policy_files import load_policy
+    from codesign_bench.rendering import RandomBehaviour, render
+    from codesign_bench.results import read_cell
+    from codesign_bench.seeding import generator
+    from codesign_bench.task import load_task
+
+    if options.policy is None and options.task is None:
+        raise UserError("render: name a --task, or a --policy, which knows its task")
+    if options.policy is not None and options.behaviour is not None:
+        raise UserError("render: either --policy or --behaviour acts, not both")
+    if options.episodes < 1:
+        raise UserError(f"--episodes must be at least 1, not {options.episodes}")
+    if options.policy is not None:
+        policy = load_policy(options.policy)
+        trained_on = (read_cell(options.policy) or {})["task"]
+        if options.task not in (None, trained_on):
+            raise UserError(f"--policy {options.policy}: trained on '{trained_on}', not on '{options.task}'")
+        line = render(load_task(trained_on), policy, options.out, options.episodes)
+    else:
+        task = load_task(options.task)
+        random = options.behaviour == "random"
+        behaviour = RandomBehaviour(task, generator(options.seed, "render")) if random else task.script()
+        line = render(task, behaviour, options.out, options.episodes)
+    console.print(line, markup=False, highlight=False, soft_wrap=True)
+    return 0
+
+
+def _bench(options: argparse.Namespace, console: Console) -> int:
+    if options.what == "tasks":
+        from codesign_bench.benchmarks.tasks import bench_tasks
+
+        bench_tasks(_names("tasks", options.task, names("tasks")), options.seconds, console)
+        return 0
+    from codesign_bench.benchmarks.learner import Workload, bench_learner, contestants
+
+    for name in ("cores", "batch_size", "minibatch_size", "epochs", "repeats"):
+        if getattr(options, name) < 1:
+            raise UserError(f"--{name.replace('_', '-')} must be at least 1, not {getattr(options, name)}")
+    wanted = options.only or list(contestants())
+    for name in wanted:
+        if name not in contestants():
+            raise unknown_name("learner", name, contestants())
+    work = Workload(
+        task=options.task,
+        batch_size=options.batch_size,
+        minibatch_size=options.minibatch_size,
+        epochs=options.epochs,
+        cores=options.cores,
+        repeats=options.repeats,
+    )
+    bench_learner(work, wanted, options.out, console)
     return 0
 
 
@@ -211,10 +400,11 @@ def _check_run(options: argparse.Namespace) -> None:
     check_fractions(options.cutout, options.alpha)
     if options.jobs is not None and options.jobs < 1:
         raise UserError(f"--jobs must be at least 1, not {options.jobs}")
-    if options.device != "cpu":
-        raise UserError(f"--device {options.device}: this version runs on the cpu alone")
-    if options.backend != "loky":
-        raise UserError(f"--backend {options.backend}: this version has loky alone")
+    if options.device == "cuda":
+        import torch
+
+        if not torch.cuda.is_available():
+            raise UserError("--device cuda: torch finds no such device here; choose cpu")
 
 
 def _check_steps(steps: int | None) -> None:

@@ -125,13 +125,18 @@ def method_config(config_class: type, stored: Mapping[str, Mapping[str, Any]]) -
         raise UserError(f"the stored configuration does not fit {config_class.__qualname__}: {error}") from error
 
 
-def differences(stored: Mapping[str, Any], resolved: Mapping[str, Any]) -> list[str]:
-    """Return "name: stored value, now value" for each value in which two `as_json` configurations differ."""
+def differences(stored: Mapping[str, Any], resolved: ResolvedConfig) -> list[str]:
+    """Return "name: stored value, asked value" for each value in which `ResolvedConfig.as_json` and `resolved` differ.
+
+    A name that the stored configuration lacks did not exist when it was stored: it counts as the class's default,
+    which is why a new hyperparameter's default must mean "as before".
+    """
     found = []
-    for part in (RUN, METHOD):
-        old, new = stored.get(part, {}), resolved[part]
+    for part, values in ((RUN, resolved.run), (METHOD, resolved.method)):
+        old, new, defaults = stored.get(part, {}), resolved.as_json()[part], type(values)()
         for name in dict.fromkeys((*old, *new)):
-            before = old.get(name, {}).get("value", "absent")
+            absent = _as_plain(getattr(defaults, name, "absent"))
+            before = old.get(name, {}).get("value", absent)
             after = new.get(name, {}).get("value", "absent")
             if before != after:
                 found.append(f"{name}: there {before}, asked {after}")

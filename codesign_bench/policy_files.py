@@ -8,7 +8,7 @@ from typing import Any
 from codesign_bench.checkpoint import load_arrays, save_arrays
 from codesign_bench.config import METHOD, method_config
 from codesign_bench.errors import UserError
-from codesign_bench.method import Policy, load_method
+from codesign_bench.method import Array, Policy, load_method
 from codesign_bench.results import CELL_FILE, DONE, POLICY_FILE, read_cell
 from codesign_bench.task import load_task
 
@@ -28,17 +28,28 @@ def load_policy(folder: str | Path) -> Policy:
     cell = read_cell(folder)
     if cell is None:
         raise UserError(f"'{folder}' is no cell's folder: it has no {CELL_FILE}")
-    path = folder / POLICY_FILE
-    try:
-        tensors, _ = load_arrays(path)
-    except FileNotFoundError:
-        state = "its policy file is missing" if cell["status"] == DONE else f"its status is '{cell['status']}'"
-        raise UserError(f"'{folder}' holds no final policy: {state}") from None
-    except ValueError as error:
-        raise UserError(f"cannot load {path}: {error}") from error
+    tensors, path = policy_tensors(folder), folder / POLICY_FILE
     method_class = load_method(cell["method"])
     config = method_config(method_class.config_class, cell["config"][METHOD])
     try:
         return method_class.make_policy(load_task(cell["task"]), config, tensors)
     except (KeyError, ValueError, RuntimeError) as error:
         raise UserError(f"{path} does not fit method '{cell['method']}' of this version: {error}") from error
+
+
+def policy_tensors(folder: Path) -> dict[str, Array]:
+    """Return the tensors of the final policy of the cell in `folder`.
+
+    Raises:
+        UserError: the folder is no finished cell, or the file is damaged.
+    """
+    cell, path = read_cell(folder), folder / POLICY_FILE
+    if cell is None:
+        raise UserError(f"'{folder}' is no cell's folder: it has no {CELL_FILE}")
+    try:
+        return load_arrays(path)[0]
+    except FileNotFoundError:
+        state = "its policy file is missing" if cell["status"] == DONE else f"its status is '{cell['status']}'"
+        raise UserError(f"'{folder}' holds no final policy: {state}") from None
+    except ValueError as error:
+        raise UserError(f"cannot load {path}: {error}") from error

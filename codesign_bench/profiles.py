@@ -9,6 +9,8 @@ from typing import Any
 from codesign_bench.errors import UserError, unknown_name
 
 DEFAULT_PROFILE = "laptop"
+DEVICES = ("cpu", "cuda")
+PRECISIONS = ("fp32", "auto")
 
 
 @dataclass(frozen=True)
@@ -19,13 +21,19 @@ class RunSettings:
     """Budget in environment steps, design steps and every candidate's included."""
     evaluations: int = 25
     """Evaluations after the first, which judges the untrained policy."""
+    fine_tuning_steps: int = 100_000
+    """Budget of cells that go on with one instance (--finetune, --scratch)."""
     tradeoff_scale: float = 1.0
     """K of equation 1; used with --alpha alone, the paper has K = 0 elsewhere."""
     threads: int = 1
-    """Threads of one cell; sums of floats depend on it, so it is no matter of --jobs."""
+    """Cores of one cell: rollouts in processes, updates of policy and value in threads; no number depends on it."""
+    device: str = "cpu"
+    """Where networks are updated: cpu or cuda. Rollouts are on the processor always; sums of floats depend on it."""
 
     def __post_init__(self) -> None:
-        for name in ("steps", "evaluations", "threads"):
+        if self.device not in DEVICES:
+            raise ValueError(f"device is one of {', '.join(DEVICES)}, not '{self.device}'")
+        for name in ("steps", "evaluations", "fine_tuning_steps", "threads"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
         if self.tradeoff_scale < 0.0:
@@ -47,7 +55,21 @@ PROFILE_HELP: Mapping[str, str] = {
     "paper": "the paper's hyperparameter tables and 10 million steps",
 }
 
-TASK_SETTINGS: Mapping[tuple[str, str], Settings] = {}
+TASK_SETTINGS: Mapping[tuple[str, str], Settings] = {
+    ("quick", "scoop"): {"steps": (260_000, "tuned for scoop (ours)")},
+    ("laptop", "scoop"): {"steps": (600_000, "tuned for scoop (ours)")},
+    ("laptop", "catch_balls"): {"tradeoff_scale": (0.01, "tuned for catch_balls (ours)")},
+    ("quick", "catch_balls"): {
+        "steps": (400_000, "tuned for catch_balls (ours)"),
+        "tradeoff_scale": (0.01, "tuned for catch_balls (ours)"),
+    },
+    ("laptop", "lift_cup"): {"steps": (700_000, "tuned for lift_cup (ours)")},
+    ("quick", "lift_cup"): {"steps": (400_000, "tuned for lift_cup (ours)")},
+    ("laptop", "scoop_3d"): {
+        "steps": (500_000, "tuned for scoop_3d (ours)"),
+        "evaluations": (10, "tuned for scoop_3d (ours)"),
+    },
+}
 """What a (profile, task) pair sets otherwise than its profile; third-party tasks run with the profile's values."""
 
 

@@ -159,6 +159,38 @@ def load_results(out: str | Path) -> pd.DataFrame:
     return frame.astype({"cutout": float, "alpha": float, "seed": int, "env_steps": int})
 
 
+def load_evaluations(out: str | Path) -> pd.DataFrame:
+    """Return what every finished cell below `out` reached on each evaluation instance, as one tidy frame.
+
+    Columns: those of `CELL_COLUMNS` and `label`, then `instance` (its number), `instance_<name>` and `design_<name>` in
+    the task's units (NaN for the entries of other tasks), return, success, episode_length, material, effort, and
+    in_cutout where the task has positions.
+
+    Raises:
+        UserError: there is no such folder, or no finished cell in it.
+    """
+    import pandas as pd
+
+    frames = []
+    for folder, content in find_cells(Path(out)):
+        if content["status"] == DONE and (folder / EVALUATION_FILE).exists():
+            table = pd.read_csv(folder / EVALUATION_FILE)
+            table.insert(0, "instance", range(len(table)))
+            frames.append(_with_cell_columns(table, content))
+    if not frames:
+        raise UserError(f"no finished cell in '{out}' yet; make some with: codesign-bench run --out {out}")
+    return pd.concat(frames, ignore_index=True).astype({"cutout": float, "alpha": float, "seed": int})
+
+
+def _with_cell_columns(table: pd.DataFrame, content: Mapping[str, Any]) -> pd.DataFrame:
+    """Put what tells the cell in front of a table's own columns."""
+    for position, name in enumerate(CELL_COLUMNS):
+        value = content[name]
+        table.insert(position, name, float("nan") if value is None else value)
+    table.insert(len(CELL_COLUMNS), LABEL_COLUMN, content.get(LABEL_COLUMN, content["method"]))
+    return table
+
+
 def _read_curve(folder: Path, content: Mapping[str, Any]) -> pd.DataFrame | None:
     import pandas as pd
 
@@ -168,8 +200,4 @@ def _read_curve(folder: Path, content: Mapping[str, Any]) -> pd.DataFrame | None
         return None
     if curve.empty or not set(CURVE_COLUMNS) <= set(curve.columns):
         return None
-    for position, name in enumerate(CELL_COLUMNS):
-        value = content[name]
-        curve.insert(position, name, float("nan") if value is None else value)
-    curve.insert(len(CELL_COLUMNS), LABEL_COLUMN, content.get(LABEL_COLUMN, content["method"]))
-    return curve
+    return _with_cell_columns(curve, content)

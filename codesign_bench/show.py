@@ -56,7 +56,7 @@ def print_status(console: Console, out: Path) -> None:
     cells = [(folder, content, cell_status(folder, content)) for folder, content in find_cells(out)]
     if not cells:
         raise UserError(f"no cells in '{out}' yet; make some with: codesign-bench run --out {out}")
-    rows = [_status_row(out, folder, content, status) for folder, content, status in cells]
+    rows = [status_row(out, folder, content, status) for folder, content, status in cells]
     print_table(console, ("cell", "status", "env_steps", "of", "return", "success"), rows)
     counts = Counter(status for _, _, status in cells)
     summary = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
@@ -67,7 +67,8 @@ def print_status(console: Console, out: Path) -> None:
             console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
-def _status_row(out: Path, folder: Path, content: dict[str, Any], status: str) -> tuple[str, ...]:
+def status_row(out: Path, folder: Path, content: dict[str, Any], status: str) -> tuple[str, ...]:
+    """Return a cell's line as text: path below `out`, status, steps, budget, last return and success."""
     last = _last_evaluation(folder)
     env_steps = max(int(last.get("env_steps", 0)), int(content["env_steps"]))
     return (

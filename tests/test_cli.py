@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from codesign_bench import method_names, task_names
+from codesign_bench import cli, method_names, task_names
 from codesign_bench.cli import main
 from codesign_bench.registry import names
 
@@ -91,7 +91,8 @@ def test_status_tells_why_a_cell_failed(tmp_path: Path, capsys: pytest.CaptureFi
         ([*RUN, "--alpha", "nan"], "--alpha"),
         ([*RUN, "--device", "cuda"], "--device"),
         ([*RUN, "--device", "abacus"], "cuda"),
-        ([*RUN, "--backend", "dask"], "--backend"),
+        ([*RUN, "--scheduler", "tcp://localhost:1"], "--scheduler goes with --backend dask"),
+        ([*RUN, "--backend", "ray"], "--backend"),
         ([*RUN, "--import", "no_such_module"], "no_such_module"),
         (["show", "--method", "toy_search", "--task", "pull"], "toy_reach"),
         (["status", "--results", "no/such/folder"], "no/such/folder"),
@@ -144,3 +145,22 @@ def test_another_configuration_is_refused(tmp_path: Path, capsys: pytest.Capture
 def test_python_dash_m_is_the_same_program() -> None:
     done = subprocess.run([sys.executable, "-m", "codesign_bench", "--version"], capture_output=True, text=True)
     assert (done.returncode, done.stdout.split()[0]) == (0, "codesign-bench")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "has_bfloat16", "expected"),
+    [
+        (["--method", "gnn_ppo"], True, []),
+        (["--method", "gnn_ppo", "--precision", "fp32"], True, ["precision=fp32"]),
+        (["--method", "gnn_ppo", "--precision", "auto"], True, ["precision=bf16"]),
+        (["--method", "gnn_ppo", "--precision", "auto"], False, ["precision=fp32"]),
+        (["--method", "cma_es", "--precision", "auto"], True, []),
+        (["--method", "gnn_ppo", "--device", "cpu", "--set", "epochs=2"], True, ["epochs=2", "device=cpu"]),
+    ],
+)
+def test_device_and_precision_are_part_of_the_configuration(
+    monkeypatch: pytest.MonkeyPatch, arguments: list[str], has_bfloat16: bool, expected: list[str]
+) -> None:
+    monkeypatch.setattr("codesign_bench.host.computes_in_bfloat16", lambda: has_bfloat16)
+    options = cli.build_parser().parse_args(["run", "--task", "push", *arguments])
+    assert cli._overrides(options) == expected

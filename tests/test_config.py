@@ -111,9 +111,17 @@ def test_a_stored_configuration_is_rebuilt_and_compared_by_value(search: type[Me
     assert method_config(search.config_class, config.as_json()["method"]) == config.method
     quick = [f"{name}={value}" for name, (value, _) in PROFILES["quick"].items()]
     same = resolve(search, "toy_reach", "laptop", ["widths=1,2", *quick])
-    assert differences(config.as_json(), same.as_json()) == []
+    assert differences(config.as_json(), same) == []
     other = resolve(search, "toy_reach", "quick", ["widths=1,3"])
-    assert differences(config.as_json(), other.as_json()) == ["widths: there [1, 2], asked [1, 3]"]
+    assert differences(config.as_json(), other) == ["widths: there [1, 2], asked [1, 3]"]
+
+
+def test_a_value_that_is_newer_than_a_stored_configuration_counts_as_its_default(search: type[Method[Any]]) -> None:
+    stored = resolve(search, "toy_reach", "quick").as_json()
+    del stored["method"]["step_size"]
+    assert differences(stored, resolve(search, "toy_reach", "quick")) == []
+    other = resolve(search, "toy_reach", "quick", ["step_size=0.5"])
+    assert differences(stored, other) == ["step_size: there 0.3, asked 0.5"]
 
 
 def test_every_method_resolves_on_every_profile_and_on_a_task_it_has_never_heard_of() -> None:

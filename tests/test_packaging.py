@@ -56,7 +56,8 @@ def test_the_installed_package_holds_every_module(installed: Path) -> None:
     for folder in ("methods", "tasks", "paper_figs"):
         expected |= {f"codesign_bench/{folder}/{name}" for name in modules(ROOT / folder)}
     assert modules(installed / "codesign_bench") == {name.removeprefix("codesign_bench/") for name in expected}
-    assert (installed / "codesign_bench" / "py.typed").is_file()
+    for name in ("py.typed", "report/templates/page.html.j2", "report/templates/style.css"):
+        assert (installed / "codesign_bench" / name).is_file()
 
 
 def test_nothing_lands_beside_the_package(installed: Path) -> None:

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
 from codesign_bench import load_policy, load_results
+from codesign_bench.cell import grid
 from codesign_bench.errors import UserError
 from codesign_bench.results import (
     CURVE_COLUMNS,
@@ -123,3 +125,19 @@ def test_a_cell_without_a_policy_says_so(tmp_path: Path, status: str, named: str
         load_policy(make_cell(tmp_path, "one", 0, 1, status=status))
     with pytest.raises(UserError, match="no cell's folder"):
         load_policy(tmp_path)
+
+
+@pytest.mark.usefixtures("toy")
+def test_evaluations_hold_every_instance_of_every_finished_cell(tmp_path: Path) -> None:
+    from codesign_bench.results import load_evaluations
+    from codesign_bench.runner import run_sweep
+
+    cells = list(grid(tasks=["toy_reach"], methods=["toy_search"], seeds=range(2), cutouts=[0.5], steps=100))
+    run_sweep(cells, tmp_path, console=Console(quiet=True))
+    frame = load_evaluations(tmp_path)
+    assert len(frame) == 2 * 8
+    assert frame.groupby("seed")["instance"].apply(list).tolist() == [list(range(8))] * 2
+    assert frame["cutout"].eq(0.5).all()
+    assert (frame["in_cutout"] == (frame["instance_goal"] < 0.5)).all()
+    with pytest.raises(UserError, match="no finished cell"):
+        load_evaluations(tmp_path / "toy_reach")

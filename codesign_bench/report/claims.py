@@ -1,0 +1,65 @@
+"""The paper's claims as the page tells them: what results say of each, and by which rule."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from codesign_bench.claims.evidence import load_evidence
+from codesign_bench.claims.paper import CLAIMS
+from codesign_bench.claims.verify import Row, judge, missing, summary
+from codesign_bench.errors import UserError
+
+from .tables import NOTHING, Table
+
+
+@dataclass(frozen=True)
+class ClaimsPart:
+    """What the page tells of claims."""
+
+    summary: str
+    table: Table | None
+    """The claims that there are data for; None where there are none."""
+    rules: Table | None
+    """How these claims were judged."""
+    lacking: Table | None
+    """The claims that there are no data for."""
+    commands: list[str]
+    """What makes the missing data."""
+
+
+def claims_part(results: Path) -> ClaimsPart:
+    """Judge the paper's claims on the folder `results`."""
+    try:
+        return part(judge(CLAIMS, load_evidence(results), str(results)))
+    except UserError as error:  # nothing has finished yet, or a table cannot be read
+        return ClaimsPart(f"No claim was judged: {error}", None, None, None, [])
+
+
+def part(rows: Sequence[Row]) -> ClaimsPart:
+    """Return judged claims as the page shows them: those with data first, those without below, folded."""
+    with_data, without = [row for row in rows if not row.needs], [row for row in rows if row.needs]
+    found = [
+        (
+            row.finding.verdict,
+            row.claim.sentence,
+            row.interval,
+            row.finding.n or NOTHING,
+            row.claim.rule.kind,
+            row.finding.note,
+        )
+        for row in with_data
+    ]
+    rules = {row.claim.rule.kind: (row.claim.rule.statistic, row.claim.rule.words) for row in with_data}
+    return ClaimsPart(
+        summary=summary(rows) + ".",
+        table=Table(("verdict", "claim", "statistic [95 % interval]", "of", "rule", "note"), found) if found else None,
+        rules=Table(("rule", "statistic", "verdict"), [(kind, *told) for kind, told in rules.items()])
+        if rules
+        else None,
+        lacking=Table(("claim", "why"), [(row.claim.sentence, row.finding.note) for row in without])
+        if without
+        else None,
+        commands=missing(rows),
+    )

@@ -1,0 +1,73 @@
+"""Figures as parts of the page: pictures, numbers and texts within it, so that it needs no other file."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from codesign_bench.plotting import Drawing, csv_bytes, possible_drawings
+from codesign_bench.text_tables import is_number, read_markdown
+
+from .tables import Table
+
+DOTS_PER_INCH = 220
+SHOWN_PER_INCH = 135
+"""CSS pixels for each inch in a paper: a figure's type of 7 points is then as large as the page's small type."""
+
+
+@dataclass(frozen=True)
+class FigurePart:
+    """One figure on the page."""
+
+    name: str
+    title: str
+    about: str
+    picture: str
+    """As a data URI, and its size on the page in CSS pixels."""
+    width: int
+    height: int
+    numbers: str
+    """The figure's CSV file as a data URI."""
+    table: Table | None
+    """The figure as a table, where it has one."""
+    texts: list[tuple[str, str]]
+    """Ending and content of every other text that the figure comes with."""
+
+
+def figure_parts(results: Path, say: Callable[[str], None]) -> list[FigurePart]:
+    """Return every figure that the results allow; `say` is told which are left out, and why."""
+    return [_part(drawing) for drawing in possible_drawings(results, say)]
+
+
+def data_uri(kind: str, content: bytes) -> str:
+    """Return `content` as an address that holds it."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
+
+
+def _part(drawing: Drawing) -> FigurePart:
+    picture = io.BytesIO()
+    drawing.figure.savefig(picture, format="png", dpi=DOTS_PER_INCH)
+    width, height = (round(SHOWN_PER_INCH * inches) for inches in drawing.figure.get_size_inches())
+    shown = read_markdown(drawing.texts.get("md", ""))
+    others = [(ending, text) for ending, text in drawing.texts.items() if ending != "md" or shown is None]
+    return FigurePart(
+        name=drawing.name,
+        title=drawing.title,
+        about=drawing.about,
+        picture=data_uri("image/png", picture.getvalue()),
+        width=width,
+        height=height,
+        numbers=data_uri("text/csv", csv_bytes(drawing.table)),
+        table=None if shown is None else _table(*shown),
+        texts=others,
+    )
+
+
+def _table(header: list[str], rows: list[list[str]]) -> Table:
+    """Return a table whose columns of numbers are aligned as such."""
+    columns = zip(*rows, strict=True) if rows else [()] * len(header)
+    numeric = {name for name, column in zip(header, columns, strict=True) if column and all(map(is_number, column))}
+    return Table(tuple(header), [tuple(row) for row in rows], frozenset(numeric))

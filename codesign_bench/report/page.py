@@ -1,0 +1,125 @@
+"""Gather what a results folder holds and write it as one HTML page that needs no other file and no network.
+
+The page runs no script, and whatever results hold is shown as text: a traceback or a label is never markup.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+
+import jinja2
+import pandas as pd
+from markupsafe import Markup, escape
+
+from codesign_bench.errors import UserError
+from codesign_bench.files import write_bytes
+from codesign_bench.plotting import make_folder
+from codesign_bench.results import CURVE_COLUMNS, load_results
+from codesign_bench.stats import CELL_KEYS
+
+from . import cells as cell_parts
+from . import provenance
+from .cells import CellRecord, Failure, read_cells
+from .claims import ClaimsPart, claims_part
+from .figures import FigurePart, figure_parts
+from .final_values import STRIP_WIDTH, TaskResult, task_results
+from .tables import Table, number
+
+ENDINGS = (".html", ".htm")
+TEMPLATE = "page.html.j2"
+
+
+@dataclass(frozen=True)
+class Page:
+    """All that the page tells, in its order."""
+
+    facts: list[tuple[str, str]]
+    results: list[TaskResult]
+    claims: ClaimsPart
+    figures: list[FigurePart]
+    left_out: list[str]
+    """Why some figures are missing."""
+    status: Table
+    failures: list[Failure]
+    damaged: list[str]
+    """Cells that could not be read."""
+    cells: Table
+    configurations: list[provenance.Configuration]
+    versions: Table
+    machines: Table
+    times: Table
+    period: str
+    code: str
+    made: str
+
+
+def write_report(results: Path, out: Path, say: Callable[[str], None]) -> None:
+    """Write the page on everything below `results` to the file `out`, and tell its path.
+
+    Raises:
+        UserError: there is no such folder or no cell in it, or `out` is no file that can be written.
+    """
+    if out.suffix.lower() not in ENDINGS:
+        raise UserError(f"--out {out}: name a file that ends in {ENDINGS[0]}")
+    if out.is_dir():
+        raise UserError(f"--out {out}: is a folder; name a file in it, e.g. {out / 'report.html'}")
+    cells, damaged = read_cells(results)
+    make_folder(out.parent)
+    write_bytes(out, render(gather(results, cells, damaged)).encode())
+    say(str(out))
+
+
+def gather(results: Path, cells: Sequence[CellRecord], damaged: list[str]) -> Page:
+    """Return all that the page tells of the folder `results` and its cells, as `read_cells` returned them."""
+    left_out: list[str] = []
+    return Page(
+        facts=cell_parts.facts(results, cells),
+        results=task_results(cells, _curves(results)),
+        claims=claims_part(results),
+        figures=figure_parts(results, left_out.append),
+        left_out=left_out,
+        status=cell_parts.status_table(cells),
+        failures=cell_parts.failures(cells),
+        damaged=damaged,
+        cells=cell_parts.cell_table(cells),
+        configurations=provenance.configurations(cells),
+        versions=provenance.version_table(cells),
+        machines=provenance.machine_table(cells),
+        times=provenance.time_table(cells),
+        period=provenance.period(cells),
+        code=provenance.code_version(),
+        made=datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
+    )
+
+
+def render(page: Page) -> str:
+    """Return the page as HTML."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("codesign_bench.report"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(number=number, code=code_spans)
+    return environment.get_template(TEMPLATE).render(page=page, strip_width=STRIP_WIDTH)
+
+
+def code_spans(text: str) -> Markup:
+    """Return `text` as HTML in which what stands between backticks is set as code."""
+    parts = text.split("`")
+    if len(parts) % 2 == 0:  # one backtick without its partner
+        return escape(text)
+    spans = (Markup("<code>{}</code>").format(part) if index % 2 else escape(part) for index, part in enumerate(parts))
+    return Markup("").join(spans)
+
+
+def _curves(results: Path) -> pd.DataFrame:
+    """Return the curves of all cells; none where no cell was evaluated yet."""
+    try:
+        return load_results(results)
+    except UserError:
+        return pd.DataFrame(columns=[*CELL_KEYS, "seed", *CURVE_COLUMNS])

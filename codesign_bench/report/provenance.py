@@ -1,0 +1,157 @@
+"""How the results were made: configurations with their sources, versions, machines, times, and the code's commit."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import codesign_bench
+from codesign_bench.config import METHOD, RUN
+from codesign_bench.progress import duration
+
+from .cells import CellRecord, in_order
+from .tables import NOTHING, Table, listed
+
+GIT_SECONDS = 10.0
+ALL_CELLS = "all"
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A method's settings in all its cells."""
+
+    method: str
+    label: str
+    table: Table
+
+
+def configurations(cells: Sequence[CellRecord]) -> list[Configuration]:
+    """Return every method's configuration: one row per setting, or one for each of its values where cells differ."""
+    found = []
+    for method in in_order("methods", (cell.method for cell in cells)):
+        group = [cell for cell in cells if cell.method == method]
+        rows = [row for part in (RUN, METHOD) for row in _setting_rows(group, part)]
+        found.append(Configuration(method, group[0].label, Table(("setting", "value", "source", "cells"), rows)))
+    return found
+
+
+def version_table(cells: Sequence[CellRecord]) -> Table:
+    """Return the version of every package that cells record, with the cells where they differ."""
+    packages = dict.fromkeys(name for cell in cells for name in cell.content["versions"])
+    rows = []
+    for name in packages:
+
+        def version(cell: CellRecord, name: str = name) -> str:
+            return str(cell.content["versions"].get(name) or "not installed")
+
+        rows += [(name, found, where(group, cells)) for found, group in _grouped(cells, version)]
+    return Table(("package", "version", "cells"), rows)
+
+
+def machine_table(cells: Sequence[CellRecord]) -> Table:
+    """Return the machines that cells ran on."""
+    names = ("name", "system", "cpu", "cores")
+    rows = []
+    for facts, group in _grouped(cells, lambda cell: tuple(str(cell.content["host"].get(name)) for name in names)):
+        threads = sorted({str(cell.content["host"].get("threads")) for cell in group})
+        rows.append((*facts, ", ".join(threads), str(len(group))))
+    header = ("machine", "system", "processor", "cores", "threads per cell", "cells")
+    return Table(header, rows, numeric=frozenset(header[3:]))
+
+
+def time_table(cells: Sequence[CellRecord]) -> Table:
+    """Return per task and method how long finished cells took, in the median, and in all."""
+    rows = []
+    for task in in_order("tasks", (cell.task for cell in cells)):
+        for method in in_order("methods", (cell.method for cell in cells if cell.task == task)):
+            group = [cell.content["timings"] for cell in cells if (cell.task, cell.method) == (task, method)]
+            known = [timings for timings in group if timings.get("wall_s") is not None]
+            spent = duration(sum(float(timings["wall_s"]) for timings in known)) if known else NOTHING
+            rows.append((task, method, str(len(known)), _median(known, "train_s"), _median(known, "evaluate_s"), spent))
+    header = ("task", "method", "cells", "training, median", "evaluation, median", "in all")
+    return Table(header, rows, numeric=frozenset(header[2:]))
+
+
+def period(cells: Sequence[CellRecord]) -> str:
+    """Return when the first cell started and the last one ended."""
+    started = [str(cell.content["timings"].get("started") or "") for cell in cells]
+    ended = [str(cell.content["timings"].get("ended") or "") for cell in cells]
+    first, last = min(filter(None, started), default=NOTHING), max(filter(None, ended), default="not ended yet")
+    return f"{_moment(first)} to {_moment(last)}"
+
+
+def code_version(folder: Path | None = None) -> str:
+    """Return the version of this code, and its commit where `folder` (default: its own) is a git checkout of it."""
+    version = f"codesign-bench {codesign_bench.__version__}"
+    folder = folder or Path(codesign_bench.__file__).parent
+    try:
+        _git(folder, "ls-files", "--error-unmatch", "__init__.py")  # else the checkout is another project's
+        commit = _git(folder, "rev-parse", "HEAD")
+        changed = _git(folder, "status", "--porcelain", "--untracked-files=no")
+    except (OSError, subprocess.SubprocessError):
+        return version
+    return f"{version}, commit {commit[:12]}{', with changes that are not committed' if changed else ''}"
+
+
+def where(group: Sequence[CellRecord], everything: Sequence[CellRecord]) -> str:
+    """Return in few words which of the cells `everything` those of `group` are: by task, variant or method if one
+    of these tells them apart from the others, else by name."""
+    chosen = {cell.name for cell in group}
+    others = [cell for cell in everything if cell.name not in chosen]
+    if not others:
+        return ALL_CELLS
+    keys: dict[str, Callable[[CellRecord], str]] = {
+        "tasks": lambda cell: cell.task,
+        "methods": lambda cell: cell.method,
+        "variants": lambda cell: cell.variant,
+    }
+    for key in keys.values():
+        if not {key(cell) for cell in group} & {key(cell) for cell in others}:
+            return listed(sorted({key(cell) for cell in group}))
+    return listed(sorted(chosen), most=2)
+
+
+def _setting_rows(cells: Sequence[CellRecord], part: str) -> Iterable[tuple[str, ...]]:
+    """Yield setting, value, source and cells; a setting is missing from cells that are older than it."""
+    settings = dict.fromkeys(name for cell in cells for name in cell.content["config"][part])
+    for name in settings:
+        having = [cell for cell in cells if name in cell.content["config"][part]]
+
+        def entry(cell: CellRecord, name: str = name) -> tuple[str, str]:
+            setting = cell.content["config"][part][name]
+            return _shown(setting["value"]), str(setting["source"])
+
+        for (value, source), group in _grouped(having, entry):
+            yield name, value, source, where(group, cells)
+
+
+def _grouped(cells: Sequence[CellRecord], key: Callable[[CellRecord], Any]) -> list[tuple[Any, list[CellRecord]]]:
+    """Return the cells by what `key` gives, in the order in which that first occurs."""
+    groups: dict[Any, list[CellRecord]] = {}
+    for cell in cells:
+        groups.setdefault(key(cell), []).append(cell)
+    return list(groups.items())
+
+
+def _shown(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def _median(timings: Sequence[dict[str, Any]], name: str) -> str:
+    known = [float(entry[name]) for entry in timings if entry.get(name) is not None]
+    return duration(median(known)) if known else NOTHING
+
+
+def _moment(text: str) -> str:
+    """Return a time as cell files hold it, to the minute; the files' times are UTC."""
+    return f"{text[:10]} {text[11:16]} UTC" if text[10:11] == "T" else text
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    command = ["git", "-C", str(folder), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=GIT_SECONDS, check=True).stdout.strip()

@@ -1,0 +1,58 @@
+"""Tables as text: Markdown for pages, LaTeX for papers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+COLUMN_END = re.compile(r"(?<!\\)\|")
+"""A bar that is no part of a cell."""
+
+LATEX_SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+}
+
+
+def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join("| " + " | ".join(text.replace("|", "\\|") for text in line) + " |" for line in lines) + "\n"
+
+
+def read_markdown(text: str) -> tuple[list[str], list[list[str]]] | None:
+    """Return header and rows of a table that `markdown` wrote, or None if `text` is anything else besides."""
+    lines = text.strip().splitlines()
+    if len(lines) < 2 or not all(line.startswith("| ") and line.endswith(" |") for line in lines):
+        return None
+    header, rule, *rows = (
+        [cell.strip().replace("\\|", "|") for cell in COLUMN_END.split(line)[1:-1]] for line in lines
+    )
+    if set(rule) != {"---"} or any(len(row) != len(header) for row in rows):
+        return None
+    return header, rows
+
+
+def latex(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a LaTeX tabular with booktabs' rules, text left and everything else right."""
+    columns = "".join("r" if is_number(cell) else "l" for cell in (rows[0] if rows else header))
+    body = [" & ".join(_escaped(text) for text in line) + r" \\" for line in (header, *rows)]
+    lines = [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", body[0], r"\midrule", *body[1:], r"\bottomrule"]
+    return "\n".join([*lines, r"\end{tabular}"]) + "\n"
+
+
+def _escaped(text: str) -> str:
+    return "".join(LATEX_SPECIAL.get(character, character) for character in text)
+
+
+def is_number(text: str) -> bool:
+    """Tell whether a cell is a number, or the dash that stands for a missing one."""
+    return text.replace(",", "").replace(".", "").replace("-", "").isdigit() or text == "-"

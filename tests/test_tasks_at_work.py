@@ -1,0 +1,43 @@
+"""Pictures of tasks: a moment in the middle of an episode of the task's script."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from codesign_bench.errors import UserError
+from codesign_bench.plotting import draw_figures
+from codesign_bench.results import write_cell
+from codesign_bench.task import load_task
+from codesign_bench.tasks_at_work import tasks_at_work
+
+
+def test_the_picture_is_of_a_moment_after_the_start_and_before_the_end() -> None:
+    row = tasks_at_work(["push"], print).iloc[0]
+    task = load_task("push")
+    assert (row["title"], row["success"]) == ("Push", 1)
+    assert row["step"] == round(0.6 * row["steps"])
+    start = task.make_simulator(1)
+    start.begin(np.array([0]), task.evaluation_instances()[row["instance"]][None])
+    assert row["picture"].shape == start.render(0).shape
+    assert not np.array_equal(row["picture"], start.render(0))
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_task_without_script_or_picture_is_left_out_by_name() -> None:
+    told: list[str] = []
+    with pytest.raises(UserError, match="no task here"):
+        tasks_at_work(["toy_reach"], told.append)
+    assert told == ["picture of toy_reach left out: task 'toy_reach' has no script"]
+
+
+def test_unless_asked_for_by_name_the_gallery_holds_the_tasks_of_the_results(tmp_path: Path) -> None:
+    folder = tmp_path / "runs" / "push" / "gnn_ppo" / "default" / "seed-00"
+    folder.mkdir(parents=True)
+    known = {"task": "push", "method": "gnn_ppo", "variant": "default", "cutout": None, "alpha": None, "seed": 0}
+    write_cell(folder, {"status": "running", "config": {}, **known})
+    draw_figures([], tmp_path / "runs", tmp_path / "figures", lambda line: None)
+    assert pd.read_csv(tmp_path / "figures" / "task_gallery.csv")["task"].tolist() == ["push"]

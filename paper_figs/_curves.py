@@ -1,0 +1,137 @@
+"""Curves of every method on every task over environment steps: what the learning-curve figures share."""
+
+from __future__ import annotations
+
+import math
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import EngFormatter, MaxNLocator
+
+from codesign_bench.errors import UserError
+
+from ._order import task_order
+from ._style import BAND_OPACITY, COLUMN_WIDTH, PAGE_WIDTH, Dashes, in_order, line_styles, style
+
+QUANTITIES = {"return_mean": "mean return", "success_rate": "success rate"}
+"""Columns drawn, one row of panels each, and their names on the axes."""
+PANELS_PER_ROW = 3
+PANEL_HEIGHT = 1.5
+"""Height of a panel, in inches."""
+SLIVER = 0.05
+"""Largest part of a curve's length that counts as too short to see."""
+NEEDED = ("env_steps", "task", "method", "variant", "seed", *QUANTITIES)
+
+
+def default_rows(frame: pd.DataFrame, figure_name: str) -> pd.DataFrame:
+    """Return the evaluated rows of the variant `default` of a frame as `codesign_bench.load_results` gives it.
+
+    Raises:
+        UserError: a column, or every row of the default variant, is missing.
+    """
+    missing = [column for column in NEEDED if column not in frame.columns]
+    if missing:
+        raise UserError(f"{figure_name}: the results lack the columns {', '.join(missing)}")
+    rows = frame[(frame["variant"] == "default") & frame["return_mean"].notna()]
+    if rows.empty:
+        raise UserError(f"{figure_name}: no evaluated cell of variant 'default'; run some with: codesign-bench run")
+    return rows
+
+
+def draw_curves(table: pd.DataFrame, labels: dict[str, str], note: str) -> Figure:
+    """Return for each task a panel of returns above one of success rates, and one legend with seed counts.
+
+    Args:
+        table: columns task, method, quantity (a key of `QUANTITIES`), env_steps, centre, low, high (NaN where there is
+            no interval), seeds (how many reached this step).
+        labels: names of methods in the legend, where they differ from the method's.
+        note: what lines and bands are.
+    """
+    styles = line_styles(table["method"])
+    tasks = task_order(table["task"])
+    columns = min(len(tasks), PANELS_PER_ROW)
+    rows = len(QUANTITIES) * math.ceil(len(tasks) / columns)
+    width = COLUMN_WIDTH if columns == 1 else PAGE_WIDTH
+    with style():
+        figure = Figure(figsize=(width, rows * PANEL_HEIGHT + 0.9), layout="constrained")
+        axes = figure.subplots(rows, columns, squeeze=False)
+        for position, task in enumerate(tasks):
+            block, column = divmod(position, columns)
+            top = len(QUANTITIES) * block
+            for row, quantity in enumerate(QUANTITIES, start=top):
+                curves = table[(table["task"] == task) & (table["quantity"] == quantity)]
+                _draw_panel(axes[row, column], curves, quantity, styles)
+            axes[top, column].set_title(str(task).replace("_", " "))
+        for axis in axes.flat:
+            axis.set_visible(axis.has_data())
+        _add_legend(figure, table, labels, note, columns=2 if columns == 1 else 3)
+        figure.draw_without_rendering()  # ticks take their settings when first drawn, which must be before leaving
+    return figure
+
+
+def method_labels(frame: pd.DataFrame) -> dict[str, str]:
+    """Return the legend's names of the methods, where the frame gives any."""
+    if "label" not in frame.columns:
+        return {}
+    known = frame.dropna(subset=["label"]).drop_duplicates("method")
+    return dict(zip(known["method"], known["label"], strict=True))
+
+
+def _draw_panel(axes: Axes, curves: pd.DataFrame, quantity: str, styles: dict[str, tuple[str, Dashes]]) -> None:
+    """Draw one quantity of one task."""
+    for method in reversed(in_order(curves["method"])):  # the paper's own method lies on top
+        _draw_curve(axes, curves[curves["method"] == method], *styles[method], gid=method)
+    axes.set_xlabel("environment steps")
+    axes.set_ylabel(QUANTITIES[quantity])
+    axes.xaxis.set_major_formatter(EngFormatter(sep=""))
+    axes.xaxis.set_major_locator(MaxNLocator(5))
+    if quantity == "success_rate":
+        axes.set_ylim(-0.03, 1.03)
+
+
+def _draw_curve(axes: Axes, curve: pd.DataFrame, colour: str, dashes: Dashes, gid: str) -> None:
+    """Draw one method's line and band; where some seeds are missing, the line is dotted."""
+    curve = _without_slivers(curve)
+    complete = curve["seeds"] == curve["seeds"].max()
+    steps, values = curve["env_steps"], curve["centre"]
+    axes.plot(steps, values.where(complete), color=colour, linestyle=dashes, gid=gid)
+    if not complete.all():
+        # The dotted stretches start and end on the solid ones.
+        dotted = ~complete | ~complete.shift(-1, fill_value=True) | ~complete.shift(1, fill_value=True)
+        axes.plot(steps, values.where(dotted), color=colour, linestyle=":", gid=f"{gid} (fewer seeds)")
+    if curve["low"].notna().any():
+        axes.fill_between(steps, curve["low"], curve["high"], color=colour, alpha=BAND_OPACITY, linewidth=0)
+
+
+def _without_slivers(curve: pd.DataFrame) -> pd.DataFrame:
+    """Cut off ends of a curve that some seeds lack and that are too short to see.
+
+    Seeds end on whole batches of whole episodes, so their last evaluations lie a few steps apart; the few that
+    went farthest would stand as a spike at the end of the line. Tables keep these rows.
+    """
+    steps = curve["env_steps"]
+    complete = steps[curve["seeds"] == curve["seeds"].max()]
+    sliver = SLIVER * steps.max()
+    first = complete.min() if complete.min() - steps.min() < sliver else steps.min()
+    last = complete.max() if steps.max() - complete.max() < sliver else steps.max()
+    return curve[(steps >= first) & (steps <= last)]
+
+
+def _add_legend(figure: Figure, table: pd.DataFrame, labels: dict[str, str], note: str, columns: int) -> None:
+    """Put one legend with each method's number of seeds below the panels and the meaning of the bands."""
+    styles = line_styles(table["method"])
+    handles = []
+    for method in in_order(table["method"]):
+        colour, dashes = styles[method]
+        label = f"{labels.get(method, method)} (n={_seed_count(table[table['method'] == method])})"
+        handles.append(Line2D([], [], color=colour, linestyle=dashes, label=label))
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, title=note, title_fontsize=5.5)
+
+
+def _seed_count(rows: pd.DataFrame) -> str:
+    """Return a method's number of seeds, or its range over the tasks."""
+    counts = rows.groupby("task")["seeds"].max()
+    low, high = int(counts.min()), int(counts.max())
+    return str(high) if low == high else f"{low}-{high}"

@@ -1,0 +1,81 @@
+"""How pictures of scenes stand in figures: cut to what matters, in a frame, without axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+Picture: TypeAlias = NDArray[np.uint8]
+"""(height, width, 3) in RGB."""
+
+MARGIN = 0.04
+"""Around what is kept, as a share of the picture's longer side."""
+MOST_CUT = 0.3
+"""Largest share of a single picture's width or height that is cut off; more would show its pixels."""
+SAME = 12
+"""Colours that differ by less in every channel count as the same; rendering is not exact."""
+FRAME_COLOUR, FRAME_WIDTH = "#999999", 0.5
+
+
+def cut_to_differences(pictures: Sequence[Picture], *, aspect: float = 4 / 3) -> list[Picture]:
+    """Cut all pictures alike to the part in which any of them differs from the first; all of it where none does.
+
+    Args:
+        pictures: of one size.
+        aspect: width over height of the result, as far as the pictures allow.
+    """
+    stack = np.stack(pictures).astype(np.int16)
+    rows, columns = _box((np.abs(stack - stack[0]).max(axis=-1) > SAME).any(axis=0), aspect)
+    return [picture[rows, columns] for picture in pictures]
+
+
+def cut_to_content(picture: Picture, *, aspect: float = 4 / 3) -> Picture:
+    """Cut off margins in the colour of the picture's upper left corner, but no more than `MOST_CUT`.
+
+    What is then higher than `aspect` (width over height) allows loses top and bottom alike.
+    """
+    difference = np.abs(picture.astype(np.int16) - picture[0, 0].astype(np.int16)).max(axis=-1)
+    rows, columns = _box(difference > SAME, aspect)
+    height, width = picture.shape[:2]
+    rows = _widen(rows.start, rows.stop, round((1.0 - MOST_CUT) * height), height)
+    columns = _widen(columns.start, columns.stop, round((1.0 - MOST_CUT) * width), width)
+    surplus = max(0, rows.stop - rows.start - round((columns.stop - columns.start) / aspect))
+    return picture[rows.start + surplus // 2 : rows.stop - (surplus - surplus // 2), columns]
+
+
+def show(axes: Axes, picture: Picture) -> Any:
+    """Draw a picture that fills `axes`, in a thin frame and without ticks; return the image."""
+    image = axes.imshow(picture, interpolation="antialiased")
+    axes.grid(visible=False)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    for spine in axes.spines.values():
+        spine.set(visible=True, color=FRAME_COLOUR, linewidth=FRAME_WIDTH)
+    return image
+
+
+def _box(mask: NDArray[np.bool_], aspect: float) -> tuple[slice, slice]:
+    """Return rows and columns of the smallest box of the wanted shape around what is set, with a margin."""
+    height, width = mask.shape
+    if not mask.any():
+        return slice(0, height), slice(0, width)
+    margin = round(MARGIN * max(height, width))
+    spans = []
+    for axis, size in ((1, height), (0, width)):
+        found = np.flatnonzero(mask.any(axis=axis))
+        spans.append((max(0, int(found[0]) - margin), min(size, int(found[-1]) + 1 + margin)))
+    (top, bottom), (left, right) = spans
+    rows = _widen(top, bottom, round((right - left) / aspect), height)
+    columns = _widen(left, right, round((bottom - top) * aspect), width)
+    return rows, columns
+
+
+def _widen(start: int, stop: int, length: int, size: int) -> slice:
+    """Return a stretch of at least `length` around start..stop that stays within `size`."""
+    length = min(max(length, stop - start), size)
+    first = min(max(0, (start + stop - length) // 2), size - length)
+    return slice(first, first + length)

@@ -1,0 +1,95 @@
+"""Fine-tuning on starts that were never trained on, against learning them from scratch (the paper's section 5.2).
+
+The paper's claim: going on from a policy that was trained on other starts needs far fewer gradient steps.
+"""
+
+from __future__ import annotations
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from codesign_bench.errors import UserError
+from codesign_bench.stats import MIN_SEEDS, curve_statistics
+
+from ._style import BAND_OPACITY, COLOURS, COLUMN_WIDTH, PAGE_WIDTH, style
+
+TITLE = "Fine-tuning"
+KINDS = {
+    "finetune": ("from the trained policy", COLOURS["gnn_ppo"]),
+    "scratch": ("from scratch", COLOURS["shared_arch"]),
+}
+"""Kind of cell, the beginning of its variant's name: its name in the legend, and its colour."""
+INTERVAL = f"line: mean over seeds; band: ± standard error, if {MIN_SEEDS} seeds or more"
+NEEDED = ("task", "method", "variant", "seed", "return_mean", "gradient_steps")
+PANELS_PER_ROW = 4
+
+
+def data(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the numbers that the figure shows.
+
+    Args:
+        frame: rows as `codesign_bench.load_results` gives them; variants other than `finetune-k` and `scratch-k` are
+            left out.
+
+    Returns:
+        Columns task, method, start (k), kind ("finetune" or "scratch"), gradient_steps, mean, standard_error, seeds.
+
+    Raises:
+        UserError: a column, or every such variant, is missing.
+    """
+    missing = [column for column in NEEDED if column not in frame.columns]
+    if missing:
+        raise UserError(f"fine_tuning: the results lack the columns {', '.join(missing)}")
+    parts = frame["variant"].str.extract(r"^(?P<kind>finetune|scratch)-(?P<start>\d+)$")
+    rows = frame[parts["kind"].notna()]
+    if rows.empty:
+        raise UserError("fine_tuning: no cell of --finetune or --scratch; run: codesign-bench reproduce fine_tuning")
+    along = rows.drop(columns="env_steps", errors="ignore").rename(columns={"gradient_steps": "env_steps"})
+    table = curve_statistics(along, "return_mean").rename(columns={"env_steps": "gradient_steps"})
+    names = table["variant"].str.split("-", expand=True)
+    table = table.assign(kind=names[0], start=names[1].astype(int))
+    columns = ["task", "method", "start", "kind", "gradient_steps", "mean", "standard_error", "seeds"]
+    return table[columns].sort_values(columns[:5], ignore_index=True)
+
+
+def draw(frame: pd.DataFrame) -> Figure:
+    """Return the figure: one panel per start.
+
+    Raises:
+        UserError: as `data` does.
+    """
+    table = data(frame)
+    panels = list(table.groupby(["task", "method", "start"]))
+    columns = min(len(panels), PANELS_PER_ROW)
+    rows = -(-len(panels) // columns)
+    with style():
+        figure = Figure(figsize=(COLUMN_WIDTH if columns == 1 else PAGE_WIDTH, 1.5 * rows + 0.7), layout="constrained")
+        axes = figure.subplots(rows, columns, squeeze=False, sharey=True)
+        for axis, ((task, _, start), part) in zip(axes.flat, panels, strict=False):
+            _draw_panel(axis, part)
+            axis.set_title(f"{str(task).replace('_', ' ')}, start {start}")
+        for axis in axes.flat:
+            axis.set_visible(axis.has_data())
+        axes[0, 0].set_ylabel("return")
+        seeds = table.groupby("kind")["seeds"].max()
+        handles = [
+            Line2D([], [], color=colour, label=f"{label} (n={seeds[kind]})")
+            for kind, (label, colour) in KINDS.items()
+            if kind in seeds
+        ]
+        figure.legend(handles=handles, loc="outside lower center", ncols=2, title=INTERVAL, title_fontsize=5.5)
+        figure.draw_without_rendering()
+    return figure
+
+
+def _draw_panel(axes: Axes, part: pd.DataFrame) -> None:
+    """Draw both kinds of one start."""
+    for kind, (_, colour) in KINDS.items():
+        curve = part[part["kind"] == kind]
+        steps, values, error = curve["gradient_steps"], curve["mean"], curve["standard_error"]
+        axes.plot(steps, values, color=colour, gid=kind)
+        if error.notna().any():
+            axes.fill_between(steps, values - error, values + error, color=colour, alpha=BAND_OPACITY, linewidth=0)
+    axes.set_xlabel("gradient steps")

@@ -1,0 +1,54 @@
+"""Learning curves as interquartile means with bootstrap intervals over seeds (Agarwal et al. 2021).
+
+The same curves as `learning_curves`, where one seed that fails or shines pulls the mean far.
+"""
+
+from __future__ import annotations
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from codesign_bench.seeding import generator
+from codesign_bench.stats import CONFIDENCE, MIN_SEEDS, curve_intervals
+
+from ._curves import QUANTITIES, default_rows, draw_curves, method_labels
+
+TITLE = "Learning curves, interquartile mean"
+
+INTERVAL = (
+    "line: interquartile mean over seeds; dotted: not all seeds got this far\n"
+    f"band: {CONFIDENCE:.0%} bootstrap interval over seeds, if {MIN_SEEDS} or more"
+)
+"""The kind of interval, written on the figure."""
+
+
+def data(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the numbers that the figure shows, the same in every call.
+
+    Args:
+        frame: rows as `codesign_bench.load_results` gives them; variants other than `default` are left out.
+
+    Returns:
+        Columns task, method, quantity ("return_mean" or "success_rate"), env_steps, interquartile_mean, low, high (NaN
+        for fewer than three seeds), seeds (how many reached this step).
+
+    Raises:
+        UserError: a column, or every row of the default variant, is missing.
+    """
+    rows, rng = default_rows(frame, "learning_curves_iqm"), generator(0, "learning_curves_iqm")
+    tables = [curve_intervals(rows, quantity, rng).assign(quantity=quantity) for quantity in QUANTITIES]
+    columns = ["task", "method", "quantity", "env_steps", "interquartile_mean", "low", "high", "seeds"]
+    return pd.concat(tables, ignore_index=True)[columns]
+
+
+def draw(frame: pd.DataFrame) -> Figure:
+    """Return the figure: for each task a panel of returns above one of success rates, and one legend with seed counts.
+
+    Args:
+        frame: rows as `codesign_bench.load_results` gives them; a column `label` names the methods in the legend.
+
+    Raises:
+        UserError: as `data` does.
+    """
+    table = data(frame).rename(columns={"interquartile_mean": "centre"})
+    return draw_curves(table, method_labels(frame), INTERVAL)

@@ -1,0 +1,121 @@
+"""Design against control under the trade-off reward of equation 1 (the paper's figure `fig:control_design_ratio`).
+
+The paper's claim on catch balls: the ratio (d_used / d_max) / (c_used / c_max) "indeed correlates with alpha, which
+indicates that agents that are directed to prefer saving either material or energy are doing so". Here is every task and
+method with cells of `run --alpha`, and beside the ratio both of its parts.
+"""
+
+from __future__ import annotations
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from codesign_bench.errors import UserError
+from codesign_bench.stats import MIN_SEEDS, mean, standard_error
+
+from ._order import task_order
+from ._style import PAGE_WIDTH, Dashes, in_order, line_styles, style
+
+TITLE = "Trade-off of design and control"
+SOURCE = "evaluations"
+NEEDED = ("task", "method", "label", "variant", "alpha", "seed", "material", "effort")
+PANEL_HEIGHT = 1.7
+"""Height of a row of panels, in inches."""
+NOTE = (
+    f"mean over seeds; bars: ± standard error, if {MIN_SEEDS} seeds or more\n"
+    r"equation 1 weighs material by $\alpha$ and effort by $1 - \alpha$"
+)
+
+QUANTITIES = {
+    "ratio": "material / effort",
+    "material": r"material $d_{used} / d_{max}$",
+    "effort": r"effort $c_{used} / c_{max}$",
+}
+"""What is drawn, one panel each, and its name on the axis."""
+
+
+def data(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the numbers that the figure shows.
+
+    Args:
+        frame: rows as `codesign_bench.results.load_evaluations` gives them; variants other than `alpha-...` are left
+            out. The ratio of a seed is its mean material over its mean effort (NaN where nothing moved).
+
+    Returns:
+        Columns task, method, label, quantity ("ratio", "material" or "effort"), alpha, mean, standard_error (NaN for
+        fewer than three seeds), seeds.
+
+    Raises:
+        UserError: a column, or every cell with an alpha, is missing.
+    """
+    missing = [column for column in NEEDED if column not in frame.columns]
+    if missing:
+        raise UserError(f"tradeoff: the evaluations lack the columns {', '.join(missing)}")
+    rows = frame[frame["variant"].str.fullmatch(r"alpha-[\d.]+")]
+    if rows.empty:
+        raise UserError(
+            "tradeoff: no finished cell with an alpha; run some with: codesign-bench run --alpha 0 0.3 0.7 1"
+        )
+    keys = ["task", "method", "label", "alpha"]
+    seeds = rows.groupby([*keys, "seed"], as_index=False)[["material", "effort"]].mean()
+    seeds["ratio"] = seeds["material"] / seeds["effort"].where(seeds["effort"] > 0.0)
+    long = seeds.melt([*keys, "seed"], list(QUANTITIES), "quantity", "value")
+    grouped = long.groupby([*keys, "quantity"], sort=False)["value"]
+    table = grouped.agg(mean=mean, standard_error=standard_error, seeds="size").reset_index()
+    return table[["task", "method", "label", "quantity", "alpha", "mean", "standard_error", "seeds"]]
+
+
+def draw(frame: pd.DataFrame) -> Figure:
+    """Return the figure: a row of panels per task, each quantity over alpha, one line per method.
+
+    Raises:
+        UserError: as `data` does.
+    """
+    table = data(frame)
+    styles = line_styles(table["method"])
+    tasks = task_order(table["task"])
+    with style():
+        figure = Figure(figsize=(PAGE_WIDTH, PANEL_HEIGHT * len(tasks) + 0.5), layout="constrained")
+        panels = figure.subplots(len(tasks), len(QUANTITIES), squeeze=False)
+        for line, task in zip(panels, tasks, strict=True):
+            for axes, quantity in zip(line, QUANTITIES, strict=True):
+                _draw_panel(axes, table[(table["task"] == task) & (table["quantity"] == quantity)], styles)
+                axes.set_ylabel(QUANTITIES[quantity])
+            line[0].set_title(str(task).replace("_", " "), loc="left")
+        _add_legend(figure, table, styles)
+        figure.draw_without_rendering()
+    return figure
+
+
+def _draw_panel(axes: Axes, table: pd.DataFrame, styles: dict[str, tuple[str, Dashes]]) -> None:
+    for method in reversed(in_order(table["method"])):  # the paper's own method lies on top
+        colour, dashes = styles[method]
+        own = table[table["method"] == method].sort_values("alpha")
+        axes.errorbar(
+            own["alpha"],
+            own["mean"],
+            own["standard_error"],
+            color=colour,
+            linestyle=dashes,
+            marker="o",
+            markersize=3,
+            capsize=2,
+            elinewidth=0.8,
+            label=method,
+        )
+    axes.set_xlim(-0.05, 1.05)
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel(r"trade-off $\alpha$")
+
+
+def _add_legend(figure: Figure, table: pd.DataFrame, styles: dict[str, tuple[str, Dashes]]) -> None:
+    handles = []
+    for method in in_order(table["method"]):
+        own = table[table["method"] == method]
+        colour, dashes = styles[method]
+        low, high = int(own["seeds"].min()), int(own["seeds"].max())
+        label = f"{own['label'].iloc[0]} (n={low if low == high else f'{low}-{high}'})"
+        handles.append(Line2D([], [], color=colour, linestyle=dashes, marker="o", markersize=3, label=label))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, title=NOTE, title_fontsize=5.5)

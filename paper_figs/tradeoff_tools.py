@@ -1,0 +1,76 @@
+"""Tools that designers make under the trade-off reward, over alpha (the paper's figure `fig:qualitative-tradeoff`).
+
+The paper's finding on catch balls: "As alpha increases, the created tools have shorter links at the sides to decrease
+material usage." Every row is one designer, trained with its own alpha, over the same goals.
+"""
+
+from __future__ import annotations
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from codesign_bench.errors import UserError
+
+from ._order import in_task_order
+from ._style import PAGE_WIDTH, style
+from ._tool_grid import NEEDED, UNSOLVED_NOTE, cut_alike, draw_grid, grid_height
+
+TITLE = "Tools over the trade-off"
+SOURCE = "designed_tools"
+ALSO_NEEDED = ("material",)
+PICTURES = 6
+"""Most pictures of one designer, spread over its goals."""
+
+
+def data(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return what each picture shows.
+
+    Args:
+        frame: as `codesign_bench.designed_tools` makes it; variants other than `alpha-...` are left out.
+
+    Returns:
+        The rows drawn, without pictures, by task and alpha; columns that no row fills are left out.
+
+    Raises:
+        UserError: a column, or every cell with an alpha, is missing.
+    """
+    return _rows(frame).drop(columns="picture").dropna(axis="columns", how="all")
+
+
+def draw(frame: pd.DataFrame) -> Figure:
+    """Return the figure: a row of tools for each task and alpha, with the share of material that they use on average.
+
+    Raises:
+        UserError: as `data` does.
+    """
+    rows = cut_alike(_rows(frame))
+    grids = [grid for _, grid in rows.groupby(["task", "alpha"], sort=False)]
+    heights = [grid_height(grid, PAGE_WIDTH) for grid in grids]
+    with style():
+        figure = Figure(figsize=(PAGE_WIDTH, sum(heights) + 0.15), layout="constrained")
+        blocks = figure.subfigures(len(grids), 1, squeeze=False, height_ratios=heights)
+        for block, grid in zip(blocks.flat[:], grids, strict=True):
+            first = grid.iloc[0]
+            title = rf"{first['title']}: {first['label']}, seed {first['seed']}, $\alpha$ = {first['alpha']:g}"
+            draw_grid(block, grid, f"{title}; these use {grid['material'].mean():.2f} of the most material")
+        figure.supxlabel(UNSOLVED_NOTE, fontsize=5.5)
+        figure.draw_without_rendering()
+    return figure
+
+
+def _rows(frame: pd.DataFrame) -> pd.DataFrame:
+    missing = [column for column in (*NEEDED, *ALSO_NEEDED) if column not in frame.columns]
+    if missing:
+        raise UserError(f"tradeoff_tools: the tools lack the columns {', '.join(missing)}")
+    rows = frame[frame["variant"].str.fullmatch(r"alpha-[\d.]+")]
+    if rows.empty:
+        raise UserError("tradeoff_tools: no finished cell with an alpha; run some with: codesign-bench run --alpha 0 1")
+    parts = [_in_a_row(grid) for _, grid in in_task_order(rows).groupby(["task", "alpha"], sort=True)]
+    return in_task_order(pd.concat(parts, ignore_index=True))
+
+
+def _in_a_row(grid: pd.DataFrame) -> pd.DataFrame:
+    """Return `PICTURES` of a grid, evenly chosen, in one row."""
+    count = min(PICTURES, len(grid))
+    chosen = [round(position * (len(grid) - 1) / max(1, count - 1)) for position in range(count)]
+    return grid.iloc[chosen].assign(row=0, column=range(count), up="")

@@ -1,0 +1,59 @@
+"""The figure of fine-tuning: mean return over gradient steps, by hand."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from codesign_bench.errors import UserError
+from codesign_bench.registry import load_module
+
+figure: Any = load_module("paper_figs", "fine_tuning")
+
+
+def results(seeds: int = 3) -> pd.DataFrame:
+    """Return curves of three gradient-step counts for two starts and both kinds, and a default cell."""
+    rows = []
+    for seed, start, (kind, slope) in product(range(seeds), (1, 2), (("finetune", 2.0), ("scratch", 1.0))):
+        for point in range(3):
+            value = slope * point + 0.5 * seed + 10.0 * (start - 1)
+            rows.append(("fetch_cube", "gnn_ppo", f"{kind}-{start}", seed, 1_000 * point, value, 40 * point))
+    rows.append(("fetch_cube", "gnn_ppo", "default", 0, 0, 99.0, 0))
+    columns = ["task", "method", "variant", "seed", "env_steps", "return_mean", "gradient_steps"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def test_the_numbers_by_hand() -> None:
+    table = figure.data(results())
+    assert set(table["start"]) == {1, 2}
+    row = table[(table["start"] == 2) & (table["kind"] == "finetune") & (table["gradient_steps"] == 80)].iloc[0]
+    assert row["mean"] == pytest.approx(4.0 + 0.5 + 10.0)  # Seeds add 0, 0.5 and 1.
+    assert row["standard_error"] == pytest.approx(0.5 / np.sqrt(3.0))
+    assert row["seeds"] == 3
+    assert 99.0 not in table["mean"].to_list()
+
+
+def test_every_start_has_a_panel_with_both_kinds_and_no_band_below_three_seeds() -> None:
+    drawn = figure.draw(results(seeds=2))
+    panels = [axes for axes in drawn.axes if axes.get_visible()]
+    assert [axes.get_title() for axes in panels] == ["fetch cube, start 1", "fetch cube, start 2"]
+    for axes in panels:
+        assert {line.get_gid() for line in axes.lines} == {"finetune", "scratch"}
+        assert not axes.collections
+        np.testing.assert_array_equal(axes.lines[0].get_xdata(), [0, 40, 80])
+    banded = figure.draw(results(seeds=3))
+    assert all(len(axes.collections) == 2 for axes in banded.axes if axes.get_visible())
+    (legend,) = banded.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["from the trained policy (n=3)", "from scratch (n=3)"]
+
+
+def test_results_without_such_cells_are_refused() -> None:
+    frame = results()
+    with pytest.raises(UserError, match="reproduce fine_tuning"):
+        figure.data(frame[frame["variant"] == "default"])
+    with pytest.raises(UserError, match="gradient_steps"):
+        figure.data(frame.drop(columns="gradient_steps"))

@@ -1,0 +1,86 @@
+"""The tables of hyperparameters: every value where it belongs, in picture and text."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from codesign_bench.errors import UserError
+from codesign_bench.registry import load_module
+
+figure: Any = load_module("paper_figs", "hyperparameter_tables")
+
+
+def row(task: str, method: str, name: str, paper: str, laptop: str) -> dict[str, str]:
+    """Return one hyperparameter."""
+    sources = {"paper_source": "paper, table", "laptop_source": "ours"}
+    return {"task": task, "method": method, "label": method, "name": name, "paper": paper, "laptop": laptop, **sources}
+
+
+def settings() -> pd.DataFrame:
+    """Return two tasks with a scene, the paper's method and a baseline each."""
+    rows = []
+    for task in ("scoop", "push"):
+        rows.append(row(task, "scene", "max_episode_steps", "30" if task == "scoop" else "150", "as in the paper"))
+        rows.append(row(task, "gnn_ppo", "gamma", "0.995", "0.98"))
+        rows.append(row(task, "gnn_ppo", "batch_size", "50000", "10000"))
+        rows.append(row(task, "gnn_ppo", "design_gnn", "(64, 64, 64)", "(32, 32)"))
+        rows.append(row(task, "cma_rl", "popsize", "24", "24" if task == "push" else "12"))
+    return pd.DataFrame(rows)
+
+
+def pictured() -> list[dict[tuple[int, int], str]]:
+    """Return the texts of each table of the picture by row and column."""
+    return [
+        {place: cell.get_text().get_text() for place, cell in axes.tables[0].get_celld().items()}
+        for axes in figure.draw(settings()).axes
+    ]
+
+
+def test_the_picture_holds_the_scene_then_each_profile_over_the_tasks_in_the_papers_order() -> None:
+    scene, paper, laptop = pictured()
+    assert [scene[0, column] for column in range(3)] == ["scene, in every profile", "push", "scoop"]
+    assert [scene[1, column] for column in range(3)] == ["Max Episode Steps", "150", "30"]
+    assert [paper[1, column] for column in range(3)] == ["Design GNN", "(64, 64, 64)", "(64, 64, 64)"]
+    assert [laptop[2, column] for column in range(3)] == ["Batch Size", "10000", "10000"]
+
+
+def test_the_picture_leaves_out_what_the_papers_tables_lack() -> None:
+    assert not any("Gamma" in part.values() for part in pictured())
+
+
+def test_texts_have_a_table_per_task_with_the_papers_rows_first() -> None:
+    page = figure.texts(settings())["md"]
+    push = page.split("## ")[1]
+    assert push.startswith("push: scene and gnn_ppo")
+    names = [line.split(" | ")[0].strip("| ") for line in push.splitlines() if line.startswith("| ")][2:]
+    assert names == ["Max Episode Steps", "Design GNN", "Batch Size", "Gamma"]
+    assert "| Gamma | 0.995 | 0.98 | paper, table | ours |" in push
+
+
+def test_a_baseline_has_one_table_that_names_the_tasks_with_other_values() -> None:
+    texts = figure.texts(settings())
+    assert "## cma_rl, on all tasks" in texts["md"]
+    assert "| Population Size | 24 | 24 (scoop: 12) |" in texts["md"]
+    assert r"Population Size & 24 & 24 (scoop: 12) \\" in texts["tex"]
+
+
+def test_latex_escapes_what_it_reads() -> None:
+    frame = pd.DataFrame([row("push", "gnn_ppo", "fix_std", "True", "50 %")])
+    assert r"Fix Design \& Control Std. & True & 50 \%" in figure.texts(frame)["tex"]
+
+
+def test_data_holds_every_row_with_its_printed_name() -> None:
+    table = figure.data(settings())
+    assert len(table) == 10
+    assert table["task"].tolist() == ["push"] * 5 + ["scoop"] * 5
+    assert set(table["printed"]) == {"Max Episode Steps", "Gamma", "Batch Size", "Design GNN", "Population Size"}
+
+
+def test_what_is_missing_is_named() -> None:
+    with pytest.raises(UserError, match="every row"):
+        figure.data(settings().iloc[:0])
+    with pytest.raises(UserError, match="lack laptop_source"):
+        figure.draw(settings().drop(columns="laptop_source"))

@@ -149,7 +149,8 @@ class Push(Task):
     )
 
     outcome = Quantity("distance from puck to goal", "m")
-    soundness = Soundness(overlap=LINK_HALF_WIDTH, speed=1.05 * np.sqrt(2.0) * MAX_SPEED, outcome_change=0.1)
+    # A puck between two links at once leaves up to a fifth faster than they move, until the contact solver has both.
+    soundness = Soundness(overlap=LINK_HALF_WIDTH, speed=1.25 * np.sqrt(2.0) * MAX_SPEED, outcome_change=0.1)
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
         """Return (count, I) goals, uniform in the area of the ring around the puck."""

@@ -212,6 +212,7 @@ def _add_bench(parser: argparse.ArgumentParser) -> None:
     learner = kinds.add_parser("learner", help="our learners beside others'", allow_abbrev=False)
     learner.add_argument("--task", default="push", metavar="T", help="default: push")
     learner.add_argument("--cores", type=_whole_number, default=1, metavar="N", help="default: 1")
+    learner.add_argument("--cells", type=_whole_number, default=1, metavar="N", help="cells at once; default: 1")
     learner.add_argument("--batch-size", type=_whole_number, default=50_000, metavar="N", help="default: 50000")
     learner.add_argument("--minibatch-size", type=_whole_number, default=2_000, metavar="N", help="default: 2000")
     learner.add_argument("--epochs", type=_whole_number, default=10, metavar="N", help="default: 10")
@@ -375,7 +376,7 @@ def _bench(options: argparse.Namespace, console: Console) -> int:
         return 0
     from codesign_bench.benchmarks.learner import Workload, bench_learner, contestants
 
-    for name in ("cores", "batch_size", "minibatch_size", "epochs", "repeats"):
+    for name in ("cores", "cells", "batch_size", "minibatch_size", "epochs", "repeats"):
         if getattr(options, name) < 1:
             raise UserError(f"--{name.replace('_', '-')} must be at least 1, not {getattr(options, name)}")
     wanted = options.only or list(contestants())
@@ -388,6 +389,7 @@ def _bench(options: argparse.Namespace, console: Console) -> int:
         minibatch_size=options.minibatch_size,
         epochs=options.epochs,
         cores=options.cores,
+        cells=options.cells,
         repeats=options.repeats,
     )
     bench_learner(work, wanted, options.out, console)

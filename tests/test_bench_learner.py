@@ -10,7 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codesign_bench.benchmarks.learner import HEADER, Speed, Workload, contestants, operations_per_sample, ours
+from codesign_bench.benchmarks import learner
+from codesign_bench.benchmarks.learner import (
+    HEADER,
+    Speed,
+    Workload,
+    contestants,
+    operations_per_sample,
+    ours,
+    together,
+)
 from codesign_bench.cli import main
 
 SMALL = ["--batch-size", "320", "--minibatch-size", "100", "--epochs", "2", "--repeats", "1"]
@@ -19,6 +28,18 @@ SMALL = ["--batch-size", "320", "--minibatch-size", "100", "--epochs", "2", "--r
 def test_end_to_end_by_hand() -> None:
     # A step costs 1 ms to roll out and twice 0.25 ms to learn from.
     assert Speed(rollout=1_000.0, update=4_000.0, peak_megabytes=1.0).end_to_end(epochs=2) == pytest.approx(1e3 / 1.5)
+
+
+def test_cells_side_by_side_by_hand() -> None:
+    both = together([Speed(1_000.0, 4_000.0, 300.0, gigaflops=5.0), Speed(3_000.0, 2_000.0, 200.0, gigaflops=6.0)])
+    assert both == Speed(4_000.0, 6_000.0, 300.0, gigaflops=11.0)
+    assert together([Speed(1.0, 1.0, 1.0)]).gigaflops is None
+
+
+def test_updates_in_bfloat16_are_measured_where_the_processor_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for has_it in (True, False):
+        monkeypatch.setattr(learner, "computes_in_bfloat16", lambda has_it=has_it: has_it)
+        assert ("gnn_ppo_bf16" in contestants()) == has_it
 
 
 def test_our_learners_are_measured_with_the_papers_networks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -74,6 +95,8 @@ def test_the_work_is_counted_per_second() -> None:
         (["--only", "gnn_poo"], "unknown learner 'gnn_poo'; choose from: gnn_ppo"),
         (["--epochs", "0"], "--epochs must be at least 1"),
         (["--cores", "4096"], "--cores 4096: there are only"),
+        (["--cells", "4096"], "--cores 1 for each of --cells 4096: there are only"),
+        (["--cells", "0"], "--cells must be at least 1"),
         (["--task", "pull"], "unknown task 'pull'"),
     ],
 )

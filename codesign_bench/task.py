@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -82,6 +82,33 @@ class ToolGraph:
     num_nodes: int
     edges: tuple[tuple[int, int], ...]
     parameter_nodes: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class BoxPart:
+    """A box that a tool is made of, in the frame of the held point."""
+
+    half_extents: tuple[float, float, float]
+    """m."""
+    centre: tuple[float, float, float]
+    """m."""
+    rotation: tuple[float, float, float, float]
+    """Quaternion (x, y, z, w)."""
+
+
+@dataclass(frozen=True)
+class PlanarPart:
+    """A straight link with round ends that a planar tool is made of, in the frame of the held point."""
+
+    start: tuple[float, float]
+    """m."""
+    end: tuple[float, float]
+    """m."""
+    radius: float
+    """Half the link's thickness, m."""
+
+
+ToolPart: TypeAlias = BoxPart | PlanarPart
 
 
 @dataclass(frozen=True)
@@ -293,6 +320,17 @@ class Task(ABC):
     @abstractmethod
     def effort(self, controls: Floats) -> Floats:
         """Return c_used / c_max in [0, 1] for controls (b, C) in [-1, 1] (equation 1)."""
+
+    def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
+        """Return what the tool of a design (D,), in the design space's units, is made of.
+
+        These are the shapes that the simulator lets collide, in the order of the tool graph's nodes and of one kind;
+        they may overlap.
+
+        Raises:
+            UserError: the task does not tell.
+        """
+        raise UserError(f"task '{self.name}' does not tell what its tools are made of")
 
     def script(self) -> Behaviour:
         """Return a designer and a controller written by hand, for pictures and checks: functions of the observation.

@@ -17,7 +17,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from codesign_bench.errors import UserError
-from codesign_bench.task import Floats, Frame, Physics, Simulator, Slots
+from codesign_bench.task import BoxPart, Floats, Frame, Physics, Simulator, Slots
 
 from ._scene import COLOURS, PICTURE_PIXELS, Clock
 
@@ -51,6 +51,12 @@ class Boxes:
     """(b, K, 3)."""
     rotations: Floats
     """(b, K, 4)."""
+
+
+def box_parts(boxes: Boxes) -> tuple[BoxPart, ...]:
+    """Return the parts of the first of the tools made up of `boxes`."""
+    entries = zip(boxes.half_extents[0].tolist(), boxes.centres[0].tolist(), boxes.rotations[0].tolist(), strict=True)
+    return tuple(BoxPart(tuple(half), tuple(centre), tuple(rotation)) for half, centre, rotation in entries)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import pymunk
 from PIL import Image, ImageDraw
 from pymunk import batch
 
-from codesign_bench.task import Box, Floats, Frame, Physics, Simulator, Slots, ToolGraph
+from codesign_bench.task import Box, Floats, Frame, Physics, PlanarPart, Simulator, Slots, ToolGraph
 
 from ._scene import COLOURS, PICTURE_PIXELS, Clock
 
@@ -56,6 +56,11 @@ def chain_points(designs: Floats, first_link_angle: float) -> Floats:
     points = np.zeros((len(designs), 4, 2))
     np.cumsum(steps, axis=1, out=points[:, 1:])
     return points
+
+
+def chain_parts(points: Floats, half_width: float) -> tuple[PlanarPart, ...]:
+    """Return the links of the chain `points` (4, 2)."""
+    return tuple(PlanarPart(tuple(start), tuple(end), half_width) for start, end in pairwise(points.tolist()))
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from codesign_bench.task import (
     Slots,
     Soundness,
     Task,
+    ToolPart,
 )
 
 from ._planar import (
@@ -31,6 +32,7 @@ from ._planar import (
     PlanarSimulator,
     View,
     chain_design_space,
+    chain_parts,
     chain_points,
     chain_tool,
 )
@@ -200,6 +202,10 @@ class CatchBalls(Task):
         """Return the share of the largest speed of the hand for controls (b, C) in [-1, 1]."""
         speed: Floats = np.abs(controls[:, 0])
         return speed
+
+    def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
+        """Return the links of the tool of a design (D,) in its units."""
+        return chain_parts(chain_points(design[None], FIRST_LINK_ANGLE)[0], LINK_HALF_WIDTH)
 
     def script(self) -> Behaviour:
         """Return a script that makes a pan on the side where the balls come down and brings its middle beneath them."""

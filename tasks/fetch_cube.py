@@ -20,9 +20,10 @@ from codesign_bench.task import (
     Soundness,
     Task,
     ToolGraph,
+    ToolPart,
 )
 
-from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, rotations_about
+from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, box_parts, rotations_about
 from ._scene import COLOURS, Clock
 
 TABLE = BOX_SCENES["fetch_cube"]
@@ -216,6 +217,10 @@ class FetchCube(Task):
         """Return the share of the largest move for controls (b, C) in [-1, 1]."""
         length: Floats = np.linalg.norm(controls, axis=1) / np.sqrt(controls.shape[1])
         return length
+
+    def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
+        """Return the links of the tool of a design (D,) in its units."""
+        return box_parts(chain_boxes(design[None])[1])
 
     def script(self) -> Behaviour:
         """Return a script that pulls the cube with whichever side of a link it can bring behind it."""

@@ -23,9 +23,10 @@ from codesign_bench.task import (
     Soundness,
     Task,
     ToolGraph,
+    ToolPart,
 )
 
-from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, rotation_matrices, rotations_about
+from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, box_parts, rotation_matrices, rotations_about
 from ._scene import COLOURS, Clock
 
 TABLE = BOX_SCENES["lift_cup"]
@@ -200,6 +201,10 @@ class LiftCup(Task):
         """Return the share of the longest way of the held end for controls (b, C) in [-1, 1]."""
         way: Floats = np.minimum(1.0, np.linalg.norm(controls, axis=1))
         return way
+
+    def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
+        """Return the handle, cross bar and prongs of the tool of a design (D,) in its units."""
+        return box_parts(fork_boxes(design[None]))
 
     def script(self) -> Behaviour:
         """Return a script that puts the prongs beside the cup and lifts."""

@@ -22,6 +22,7 @@ from codesign_bench.task import (
     Slots,
     Soundness,
     Task,
+    ToolPart,
 )
 
 from ._planar import (
@@ -33,6 +34,7 @@ from ._planar import (
     PlanarSimulator,
     View,
     chain_design_space,
+    chain_parts,
     chain_points,
     chain_tool,
 )
@@ -182,6 +184,10 @@ class Push(Task):
         """Return the share of the largest speed of the held end for controls (b, C) in [-1, 1]."""
         speed: Floats = np.linalg.norm(controls, axis=1) / np.sqrt(controls.shape[1])
         return speed
+
+    def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
+        """Return the links of the tool of a design (D,) in its units."""
+        return chain_parts(chain_points(design[None], FIRST_LINK_ANGLE)[0], LINK_HALF_WIDTH)
 
     def script(self) -> Behaviour:
         """Return a script that pulls or pushes the puck with whichever part of a tool lies behind it."""

@@ -27,6 +27,7 @@ from codesign_bench.task import (
     Slots,
     Soundness,
     Task,
+    ToolPart,
 )
 
 from ._planar import (
@@ -37,6 +38,7 @@ from ._planar import (
     PlanarSimulator,
     View,
     chain_design_space,
+    chain_parts,
     chain_points,
     overlap,
 )
@@ -245,6 +247,10 @@ class Scoop(Task):
         """Return the share of the largest velocity, all three entries normalised, for controls (b, C) in [-1, 1]."""
         speed: Floats = np.linalg.norm(controls, axis=1) / np.sqrt(controls.shape[1])
         return speed
+
+    def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
+        """Return the links of the tool of a design (D,) in its units."""
+        return chain_parts(chain_points(design[None], FIRST_LINK_ANGLE)[0], LINK_HALF_WIDTH)
 
     def script(self) -> Behaviour:
         """Return a script that lifts whatever tool it is given straight up, and designs a ladle for every number."""

@@ -25,9 +25,20 @@ from codesign_bench.task import (
     Soundness,
     Task,
     ToolGraph,
+    ToolPart,
 )
 
-from ._bullet import LEVEL, MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, rotation_matrices, rotations_about
+from ._bullet import (
+    LEVEL,
+    MAX_SLOTS,
+    Boxes,
+    BulletSimulator,
+    Camera,
+    Marks,
+    box_parts,
+    rotation_matrices,
+    rotations_about,
+)
 from ._scene import COLOURS, Clock
 
 TABLE = BOX_SCENES["scoop_3d"]
@@ -254,6 +265,10 @@ class Scoop3D(Task):
         """Return the share of the largest change of pose for controls (b, C) in [-1, 1]."""
         change: Floats = np.linalg.norm(controls, axis=1) / np.sqrt(controls.shape[1])
         return change
+
+    def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
+        """Return the handle and plates of the tool of a design (D,) in its units."""
+        return box_parts(scoop_boxes(design[None]))
 
     def script(self) -> Behaviour:
         """Return a script that lifts straight up and holds still."""

@@ -244,3 +244,13 @@ def test_the_tradeoff_reward_is_added_to_every_control_step(task: Task) -> None:
     for step in range(len(script.controls)):
         expected = 0.5 * (1.0 - 0.6 * material - 0.4 * task.effort(script.controls[step]))
         np.testing.assert_allclose((weighed.reward - plain.reward)[step], expected * running[step], atol=1e-9)
+
+
+def test_a_tool_is_made_of_parts_that_its_design_changes(task: Task) -> None:
+    low, high = task.design_space.bounds
+    rng = np.random.default_rng(0)
+    first, second = (task.tool_parts(design) for design in task.design_space.sample(rng, 2))
+    assert len(first) == len(second) == task.tool_graph.num_nodes
+    assert first != second
+    assert task.tool_parts(0.5 * (low + high)) == task.tool_parts(0.5 * (low + high))
+    assert len({type(part) for part in first}) == 1

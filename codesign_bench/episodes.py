@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from codesign_bench.task import Booleans, Floats, Singles, Slots, Task
+from codesign_bench.task import Booleans, Floats, Simulator, Singles, Slots, Task
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,14 @@ class Episodes:
     counts as an environment step and has reward 0.
     """
 
-    def __init__(self, task: Task, num_slots: int, tradeoff: Tradeoff | None = None) -> None:
+    def __init__(
+        self, task: Task, num_slots: int, tradeoff: Tradeoff | None = None, simulator: Simulator | None = None
+    ) -> None:
         self.task = task
         self.tradeoff = tradeoff
         self.num_slots = num_slots
         self.layout = task.layout
-        self.simulator = task.make_simulator(num_slots)
+        self.simulator = task.make_simulator(num_slots) if simulator is None else simulator
         self.observation: Singles = np.zeros((num_slots, self.layout.size), dtype=np.float32)
         self.elapsed = np.zeros(num_slots, dtype=np.intp)
         """(B,) control steps since the design step."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from codesign_bench.errors import UserError
 from codesign_bench.registry import load, names
 from codesign_bench.seeding import generator
+
+if TYPE_CHECKING:
+    from codesign_bench.deployment.robot import DeployedSimulator
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -352,10 +355,24 @@ class Task(ABC):
                 may leave this argument out).
         """
 
+    def make_deployed_simulator(self, num_slots: int, arm: str) -> DeployedSimulator:
+        """Return a simulator with `num_slots` slots whose tools are held by `arm`, one of `deployment.robot.ARMS`.
+
+        Raises:
+            UserError: the task has none.
+        """
+        raise UserError(f"task '{self.name}' has no deployment; choose from: {', '.join(deployable_tasks())}")
+
 
 def task_names() -> tuple[str, ...]:
     """Return the names of all tasks, built-in and third-party."""
     return names("tasks")
+
+
+def deployable_tasks() -> tuple[str, ...]:
+    """Return the names of the tasks that can be deployed on an arm."""
+    base = Task.make_deployed_simulator
+    return tuple(name for name in task_names() if type(load_task(name)).make_deployed_simulator is not base)
 
 
 def load_task(name: str) -> Task:

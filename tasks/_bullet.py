@@ -1,6 +1,6 @@
-"""What the 3D tasks share: a simulator with one PyBullet world per slot, and a tool of boxes on a Cartesian gantry.
+"""What the 3D tasks share: a simulator with one PyBullet world per slot, and a tool of boxes that a carrier moves.
 
-Shapes: `B` slots, `b` the slots a call names, `N` moving bodies, `K` boxes of a tool, `A` axes of the gantry.
+Shapes: `B` slots, `b` the slots a call names, `N` moving bodies, `K` boxes of a tool, `A` axes of the held point.
 Lengths are in m, angles in rad, times in s, masses in kg, forces in N. Rotations are quaternions (x, y, z, w).
 """
 
@@ -16,24 +16,16 @@ from typing import ClassVar
 import numpy as np
 from PIL import Image, ImageDraw
 
-from codesign_bench.errors import UserError
-from codesign_bench.task import BoxPart, Floats, Frame, Physics, Simulator, Slots
+from codesign_bench.deployment.robot import ArmReport, DeployedSimulator
+from codesign_bench.task import BoxPart, Floats, Frame, Physics, Slots
 
+from ._carriers import LEVEL, Carrier, Gantry, HeldTool, ToolShape, pybullet, run
 from ._scene import COLOURS, PICTURE_PIXELS, Clock
-
-try:
-    import pybullet
-except ModuleNotFoundError as error:
-    raise UserError("3D tasks need pybullet (it has wheels for Python 3.10 and 3.11): pip install pybullet") from error
 
 GRAVITY = 9.81
 """m/s^2."""
-CARRIAGE_MASS = 0.1
-"""Of each moving part of the gantry but the last, which is the tool (ours)."""
 MAX_SLOTS = 28
 """For `Task.max_slots`: an idle world takes over 20 MB, and a cell should stay below 1 GB (ours)."""
-LEVEL = (0.0, 0.0, 0.0, 1.0)
-"""The rotation that turns nothing."""
 PICTURE_SHAPE = (3 * PICTURE_PIXELS // 4, PICTURE_PIXELS)
 """Height and width of a picture in pixels."""
 
@@ -92,12 +84,10 @@ def rotation_matrices(rotations: Floats) -> Floats:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-class BulletSimulator(Simulator):
+class BulletSimulator(DeployedSimulator):
     """One PyBullet world per slot, emptied before every episode so that nothing of the last one can reach the next.
 
-    The robot is a gantry: sliding joints along x, y and z, then turning joints about `turning_axes`, and behind them
-    the tool as one rigid shape. Its joint positions are the pose of the held point. Motors hold it at a commanded
-    velocity with limited force, so a tool that is blocked stops instead of pressing through.
+    The robot is a `Gantry` unless another carrier is given, as deployment does.
 
     A subclass fills a world in `build_scene`, calls `restart` from `begin`, `add_tools` from `build`, and
     `drive`, `advance`, `read_tools` and `read_bodies` from `step`. Worlds are taken up at their first use and handed on
@@ -105,7 +95,7 @@ class BulletSimulator(Simulator):
     the engine itself are set nowhere but here.
     """
 
-    camera: ClassVar[Camera]
+    camera: Camera
     room: ClassVar[tuple[tuple[float, float], ...]]
     """Lowest and highest x, y and z where the centres of moving bodies may be, m."""
     turning_axes: ClassVar[tuple[int, ...]] = ()
@@ -121,19 +111,23 @@ class BulletSimulator(Simulator):
     contact_correction: ClassVar[float | None] = None
     """Share of an overlap that a physics step takes away; None: PyBullet's own."""
 
-    def __init__(self, num_slots: int, state_size: int, num_bodies: int, clock: Clock) -> None:
+    def __init__(
+        self, num_slots: int, state_size: int, num_bodies: int, clock: Clock, carrier: Carrier | None = None
+    ) -> None:
         super().__init__(num_slots, state_size)
         self.clock = clock
         self.worlds: list[int | None] = [None] * num_slots
         self.moving: list[list[int]] = [[] for _ in range(num_slots)]
         """The moving bodies of every world, tool excepted, as `build_scene` returned them."""
+        self.held: list[HeldTool | None] = [None] * num_slots
         self.tools: list[int | None] = [None] * num_slots
+        """The bodies that hold the tools, these included."""
         self.bodies: Floats = np.zeros((num_slots, num_bodies, 13))
         """(B, N, 13): position (3), rotation (4), velocity (3), angular velocity (3) of the moving bodies."""
         self.pose: Floats = np.zeros((num_slots, 3 + len(self.turning_axes)))
         """(B, A): pose of the held point."""
-        self._axes = list(range(self.pose.shape[1]))
-        self._forces = [self.push_force] * 3 + [self.turn_torque] * len(self.turning_axes)
+        self.carrier: Carrier = carrier or Gantry(self.turning_axes, self.push_force, self.turn_torque)
+        """What holds the tools of all slots."""
         weakref.finalize(self, _hand_on, self.worlds)
 
     @abstractmethod
@@ -156,7 +150,7 @@ class BulletSimulator(Simulator):
             if self.contact_correction is not None:
                 pybullet.setPhysicsEngineParameter(contactERP=self.contact_correction, physicsClientId=world)
             pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=world)
-            self.tools[slot] = None
+            self.held[slot] = self.tools[slot] = None
             self.moving[slot] = self.build_scene(slot)
         self.read_bodies(slots)
 
@@ -233,81 +227,39 @@ class BulletSimulator(Simulator):
         """Draw a body, or one of its links, in `colour` ("#rrggbb") from now on."""
         pybullet.changeVisualShape(body, link, rgbaColor=_rgba(colour), physicsClientId=self.worlds[slot])
 
+    def hide(self, slot: int, body: int) -> None:
+        """Leave a body of one shape out of pictures."""
+        pybullet.changeVisualShape(body, -1, rgbaColor=(1.0, 1.0, 1.0, 0.0), physicsClientId=self.worlds[slot])
+
     def add_tools(self, slots: Slots, boxes: Boxes, poses: Floats) -> None:
-        """Add a gantry with a tool of `boxes` to the worlds of `slots`, held at `poses` (b, A)."""
+        """Add a carrier with a tool of `boxes` to the worlds of `slots`, held at `poses` (b, A)."""
         parts = boxes.half_extents.tolist(), boxes.centres.tolist(), boxes.rotations.tolist()
         for slot, half_extents, centres, rotations, pose in zip(slots.tolist(), *parts, poses.tolist(), strict=True):
-            world = self.worlds[slot]
-            shape = pybullet.createCollisionShapeArray(
-                shapeTypes=[pybullet.GEOM_BOX] * len(half_extents),
-                halfExtents=half_extents,
-                collisionFramePositions=centres,
-                collisionFrameOrientations=rotations,
-                physicsClientId=world,
-            )
-            self.tools[slot] = self._add_gantry(world, shape, pose)
-            self.paint(slot, self._tool(slot), COLOURS["tool"], self._axes[-1])
+            tool = ToolShape(half_extents, centres, rotations, self.tool_mass, self.tool_friction)
+            held = self.carrier.add(self.worlds[slot], tool, pose)
+            self.held[slot], self.tools[slot] = held, held.body
+            self.paint(slot, held.body, COLOURS["tool"], held.tool_link)
         self.pose[slots] = poses
-
-    def _add_gantry(self, world: int | None, shape: int, pose: Sequence[float]) -> int:
-        count = len(self._axes)
-        kinds = [pybullet.JOINT_PRISMATIC] * 3 + [pybullet.JOINT_REVOLUTE] * len(self.turning_axes)
-        tool: int = pybullet.createMultiBody(
-            0.0,
-            -1,
-            -1,
-            [0.0, 0.0, 0.0],
-            linkMasses=[CARRIAGE_MASS] * (count - 1) + [self.tool_mass],
-            linkCollisionShapeIndices=[-1] * (count - 1) + [shape],
-            linkVisualShapeIndices=[-1] * count,
-            linkPositions=[[0.0, 0.0, 0.0]] * count,
-            linkOrientations=[LEVEL] * count,
-            linkInertialFramePositions=[[0.0, 0.0, 0.0]] * count,
-            linkInertialFrameOrientations=[LEVEL] * count,
-            linkParentIndices=list(range(count)),
-            linkJointTypes=kinds,
-            linkJointAxis=np.eye(3)[[0, 1, 2, *self.turning_axes]].tolist(),
-            physicsClientId=world,
-        )
-        for axis, start in zip(self._axes, pose, strict=True):
-            pybullet.resetJointState(tool, axis, start, physicsClientId=world)
-            pybullet.changeDynamics(
-                tool,
-                axis,
-                lateralFriction=self.tool_friction,
-                linearDamping=0.0,
-                angularDamping=0.0,
-                jointDamping=0.0,
-                physicsClientId=world,
-            )
-        return tool
 
     def drive(self, slots: Slots, displacements: Floats) -> None:
         """Set the motors of `slots` such that the held points make `displacements` (b, A) in one control step."""
         velocities = (displacements / self.clock.control_period).tolist()
         for slot, velocity in zip(slots.tolist(), velocities, strict=True):
-            pybullet.setJointMotorControlArray(
-                self._tool(slot),
-                self._axes,
-                pybullet.VELOCITY_CONTROL,
-                targetVelocities=velocity,
-                forces=self._forces,
-                physicsClientId=self.worlds[slot],
-            )
+            self._held(slot).drive(velocity)
 
     def advance(self, slots: Slots) -> None:
         """Make PyBullet's steps of one control step in the worlds of `slots`."""
-        step, steps = pybullet.stepSimulation, range(self.clock.steps)
+        steps = self.clock.steps
         for slot in slots.tolist():
-            world = self.worlds[slot]
-            for _ in steps:
-                step(world)
+            held, world = self.held[slot], self.worlds[slot]
+            if held is None:
+                run(world, steps)
+            else:
+                held.advance(steps)
 
     def read_tools(self, slots: Slots) -> Floats:
         """Read the poses of the held points of `slots` into `pose`; return them, (b, A)."""
-        read, axes = pybullet.getJointStates, self._axes
-        rows = [[joint[0] for joint in read(self._tool(slot), axes, self.worlds[slot])] for slot in slots.tolist()]
-        self.pose[slots] = rows
+        self.pose[slots] = [self._held(slot).read() for slot in slots.tolist()]
         return self.pose[slots]
 
     def read_bodies(self, slots: Slots) -> Floats:
@@ -321,6 +273,24 @@ class BulletSimulator(Simulator):
                     values.extend(part)
         self.bodies[slots] = np.array(values).reshape(len(slots), -1, 13)
         return self.bodies[slots]
+
+    def perturb(self, slot: int, friction: float, mass: float) -> None:
+        """Multiply friction and mass, inertia with it, of the moving bodies in `slot`."""
+        world = self.worlds[slot]
+        for body in self.moving[slot]:
+            own_mass, own_friction, inertia, *_ = pybullet.getDynamicsInfo(body, -1, physicsClientId=world)
+            pybullet.changeDynamics(
+                body,
+                -1,
+                mass=mass * own_mass,
+                localInertiaDiagonal=[mass * value for value in inertia],
+                lateralFriction=friction * own_friction,
+                physicsClientId=world,
+            )
+
+    def arm_report(self, slot: int) -> ArmReport:
+        """Return what has happened to the arm in `slot` since `build`; nothing ever happens to the gantry."""
+        return self._held(slot).report
 
     def inspect(self, slot: int) -> Physics:
         """Return deepest overlap of any two bodies, fastest body, and whether all moving bodies are in the room."""
@@ -363,6 +333,11 @@ class BulletSimulator(Simulator):
 
     def mark(self, slot: int, marks: Marks) -> None:
         """Draw what is no body, above the bodies: a goal, a line. Nothing by default."""
+
+    def _held(self, slot: int) -> HeldTool:
+        held = self.held[slot]
+        assert held is not None, "a tool is built before it is moved"
+        return held
 
     def _tool(self, slot: int) -> int:
         tool = self.tools[slot]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from codesign_bench.deployment.robot import DeployedSimulator
 from codesign_bench.paper_tables import BOX_SCENES, PROTOCOL
 from codesign_bench.task import (
     Behaviour,
@@ -24,6 +25,8 @@ from codesign_bench.task import (
 )
 
 from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, box_parts, rotations_about
+from ._carriers import Carrier
+from ._deployed import arm_carrier
 from ._scene import COLOURS, Clock
 
 TABLE = BOX_SCENES["fetch_cube"]
@@ -88,6 +91,11 @@ SIZES = tuple(
 ANGLES = tuple(float(np.deg2rad(bound)) for bound in (TABLE.tool_angle_min[0], TABLE.tool_angle_max[0]))
 """Of a joint, rad (paper)."""
 NUM_LINKS = 3
+
+ARM_BASE = (0.0, 0.0, 0.0)
+"""Where a robot's base stands, m: at the origin (paper), on the table (ours)."""
+ARM_CAMERA = Camera(eye=(0.0, 1.75, 1.0), target=(0.0, 0.38, 0.16))
+"""Sees arm and cube in deployment: from behind the overhang."""
 
 
 def _design_space() -> Box:
@@ -230,6 +238,13 @@ class FetchCube(Task):
         """Return a simulator of `num_slots` cubes and tools."""
         return _FetchCubeSimulator(num_slots, self.state_space.size, CLOCK.refined(refinement))
 
+    def make_deployed_simulator(self, num_slots: int, arm: str) -> DeployedSimulator:
+        """Return a simulator of `num_slots` cubes whose tools are held by `arm`, seen from the side."""
+        carrier = arm_carrier(arm, ARM_BASE, CLOCK)
+        simulator = _FetchCubeSimulator(num_slots, self.state_space.size, CLOCK, carrier)
+        simulator.camera, simulator.roofless = ARM_CAMERA, True
+        return simulator
+
 
 class _FetchCubeSimulator(BulletSimulator):
     """Table, overhang, cube and tool, one of each per slot."""
@@ -239,8 +254,10 @@ class _FetchCubeSimulator(BulletSimulator):
     room = ((-1.5, 1.5), (-1.0, 2.0), (0.4 * CUBE_SIZE, CUBE_SIZE))
     tool_friction = TOOL_FRICTION
 
-    def __init__(self, num_slots: int, state_size: int, clock: Clock) -> None:
-        super().__init__(num_slots, state_size, num_bodies=1, clock=clock)
+    def __init__(self, num_slots: int, state_size: int, clock: Clock, carrier: Carrier | None = None) -> None:
+        super().__init__(num_slots, state_size, num_bodies=1, clock=clock, carrier=carrier)
+        self.roofless = False
+        """Whether pictures leave the overhang out, which a camera at the side would not see beneath."""
         self.start = np.zeros((num_slots, 2))
         self.distance = np.zeros(num_slots)
         self.low = np.tile([HOLD_X[0], HOLD_Y[0], 0.0], (num_slots, 1))
@@ -264,12 +281,14 @@ class _FetchCubeSimulator(BulletSimulator):
         """Add table, overhang and cube."""
         depth, thickness = OVERHANG_Y[1] - OVERHANG_Y[0], OVERHANG_THICKNESS
         self.add_box(slot, (2.5, 2.5, 0.1), (0.0, 0.5, -0.1), friction=TABLE_FRICTION, colour="#f2f2f0")
-        self.add_box(
+        overhang = self.add_box(
             slot,
             (OVERHANG_X[1], 0.5 * depth, 0.5 * thickness),
             (0.0, 0.5 * sum(OVERHANG_Y), OVERHANG_HEIGHT + 0.5 * thickness),
             friction=TABLE_FRICTION,
         )
+        if self.roofless:
+            self.hide(slot, overhang)
         x, y = self.start[slot].tolist()
         half = 0.5 * CUBE_SIZE
         cube = self.add_box(slot, (half,) * 3, (x, y, half), mass=CUBE_MASS, colour=COLOURS["object"])

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from codesign_bench.deployment.robot import DeployedSimulator
 from codesign_bench.paper_tables import BOX_SCENES
 from codesign_bench.task import (
     Behaviour,
@@ -27,6 +28,8 @@ from codesign_bench.task import (
 )
 
 from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, box_parts, rotation_matrices, rotations_about
+from ._carriers import Carrier
+from ._deployed import arm_carrier
 from ._scene import COLOURS, Clock
 
 TABLE = BOX_SCENES["lift_cup"]
@@ -86,6 +89,14 @@ PLAY = 0.25 * RIM_WIDTH
 """Prongs this far from the middle of the rim still fit perfectly, m (ours)."""
 START_POTENTIAL = -1.0
 """Of every episode's start: the one of prongs 0.25 m away (ours)."""
+
+ARM_BASE = (0.0, 0.95, 0.4)
+"""Where a robot's base stands, m (ours): 0.4 m above the table and 0.7 m behind the cup.
+
+From there a Panda reaches from below the rims up to the lifted cup; the paper does not tell where its own stood.
+"""
+ARM_CAMERA = Camera(eye=(1.5, 1.45, 0.7), target=(0.0, 1.3, 0.42))
+"""Sees arm and cup in deployment."""
 
 CLOCK = Clock(steps=TABLE.control_steps_per_action, period=1.0 / 240.0)
 """Ten physics steps per control step (paper, table of lift cup) of 1/240 s (ours)."""
@@ -214,6 +225,13 @@ class LiftCup(Task):
         """Return a simulator of `num_slots` cups and forks."""
         return _LiftCupSimulator(num_slots, self.state_space.size, CLOCK.refined(refinement))
 
+    def make_deployed_simulator(self, num_slots: int, arm: str) -> DeployedSimulator:
+        """Return a simulator of `num_slots` cups whose forks are held by `arm`, seen from the side."""
+        carrier = arm_carrier(arm, ARM_BASE, CLOCK)
+        simulator = _LiftCupSimulator(num_slots, self.state_space.size, CLOCK, carrier)
+        simulator.camera = ARM_CAMERA
+        return simulator
+
 
 def _volume(designs: Floats) -> Floats:
     """Return the volume (b,) of prongs and cross bar, m^3."""
@@ -309,8 +327,8 @@ class _LiftCupSimulator(BulletSimulator):
     _SIDES = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
     """Left and right, near and far: the four points under the rim."""
 
-    def __init__(self, num_slots: int, state_size: int, clock: Clock) -> None:
-        super().__init__(num_slots, state_size, num_bodies=1, clock=clock)
+    def __init__(self, num_slots: int, state_size: int, clock: Clock, carrier: Carrier | None = None) -> None:
+        super().__init__(num_slots, state_size, num_bodies=1, clock=clock, carrier=carrier)
         self.size = np.zeros((num_slots, 2))
         """(B, 2): width and height of the cup, m."""
         self.centre_height = np.zeros(num_slots)

@@ -331,7 +331,7 @@ def test_worlds_are_made_when_used_and_handed_on() -> None:
 
 
 def test_without_pybullet_the_task_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("fetch_cube", "_bullet"):
+    for name in ("fetch_cube", "_bullet", "_carriers"):
         monkeypatch.delitem(sys.modules, f"codesign_bench.tasks.{name}")
     monkeypatch.setitem(sys.modules, "pybullet", None)
     with pytest.raises(UserError, match="pip install pybullet"):

@@ -1,0 +1,24 @@
+"""What tasks that can be deployed share: the arm by its name."""
+
+from __future__ import annotations
+
+from codesign_bench.deployment.robot import ARMS, IDEAL
+from codesign_bench.errors import unknown_name
+
+from ._carriers import Carrier
+from ._scene import Clock
+
+
+def arm_carrier(arm: str, base: tuple[float, float, float], clock: Clock) -> Carrier | None:
+    """Return the carrier that `arm`, one of `ARMS`, means, its base at `base` (m); None for the task's own gantry.
+
+    Raises:
+        UserError: there is no such arm.
+    """
+    if arm not in ARMS:
+        raise unknown_name("arm", arm, ARMS)
+    if arm == IDEAL:
+        return None
+    from ._panda import PandaArm  # here, since pybullet_data is needed by no training
+
+    return PandaArm(base, clock)

@@ -1,0 +1,308 @@
+"""The Franka Panda as a carrier of tools: PyBullet's own model, inverse kinematics and a joint controller with limits.
+
+Shapes: `J` = 7 joints, `K` boxes of a tool, `A` axes of the held point, three here: the tool is never turned.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pybullet_data
+
+from codesign_bench.task import Floats
+
+from . import _panda_kinematics as kinematics
+from ._carriers import Carrier, HeldTool, ToolShape, pybullet
+from ._scene import Clock
+
+MODEL = Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"
+GRIP_REACH = 0.105
+"""From the hand's frame to the middle of the finger tips, along the hand's z axis, m (URDF)."""
+FINGER_OPENING = 0.01
+"""Of each finger from the middle, m (ours): closed round the grip."""
+BASE_TURN = 0.5 * np.pi
+"""The arm's x axis, to which it points at rest, is the y axis of the tasks, rad (ours)."""
+
+GRIP_BACK, GRIP_UP = 0.03, 0.09
+"""The fingers hold a post behind and above the held point, m (ours).
+
+The hand, 6 cm thick, then stays above the overhang and off the table while the tool slides on the table.
+"""
+GRIP_LEAN = float(np.deg2rad(25.0))
+"""The hand's top leans away from the robot, rad (ours): an upright hand cannot be brought as near as 0.3 m."""
+POST_HALF_WIDTH = 0.01
+"""m (ours)."""
+FOOT_HALF_HEIGHT = 0.005
+"""Of the bar between post and held point, m (ours): as thin as the thinnest tool."""
+TOOL_LINK = "tool"
+
+STIFFNESS = 900.0
+"""Joint acceleration per error, 1/s^2 (ours): about 3000 N/m at the hand, the stiffest that Franka's own allows."""
+DAMPING = 2.0 * STIFFNESS**0.5
+"""Joint acceleration per error of speed, 1/s (ours): critical."""
+LEASH = 0.03
+"""The command stays this near to the held point, m (ours): a blocked arm does not push ever harder."""
+OVERLAP = 0.005
+"""Links that overlap deeper than this collide, m (ours); hulls of neighbours overlap a little at rest."""
+
+
+def _grip_frame() -> Floats:
+    """Return the hand's frame in that of the held point, (4, 4)."""
+    approach = np.array([0.0, -np.sin(GRIP_LEAN), -np.cos(GRIP_LEAN)])
+    across = np.array([1.0, 0.0, 0.0])
+    frame = np.eye(4)
+    frame[:3, 0], frame[:3, 1], frame[:3, 2] = np.cross(across, approach), across, approach
+    frame[:3, 3] = np.array([0.0, -GRIP_BACK, GRIP_UP]) - GRIP_REACH * approach
+    return frame
+
+
+GRIP = _grip_frame()
+
+
+@dataclass(frozen=True)
+class PandaArm(Carrier):
+    """A Panda that holds tools by a post; see docs/deployment.md."""
+
+    base: tuple[float, float, float]
+    """Where its base stands, m."""
+    clock: Clock
+
+    def add(self, world: int | None, tool: ToolShape, pose: Sequence[float]) -> HeldTool:
+        """Add an arm whose tool's held point is at `pose`, or as near as it can be."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "panda_with_tool.urdf"
+            path.write_text(model_with_tool(tool))
+            body: int = pybullet.loadURDF(
+                str(path),
+                self.base,
+                [0.0, 0.0, np.sin(0.5 * BASE_TURN), np.cos(0.5 * BASE_TURN)],
+                useFixedBase=True,
+                flags=pybullet.URDF_ENABLE_CACHED_GRAPHICS_SHAPES,
+                physicsClientId=world,
+            )
+        for link in range(-1, pybullet.getNumJoints(body, world)):
+            pybullet.changeDynamics(
+                body,
+                link,
+                lateralFriction=tool.friction,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                physicsClientId=world,
+            )
+        return _OnPanda(world, body, self, pose)
+
+    def hand_frame(self, held: Floats) -> Floats:
+        """Return the hand's frame (4, 4), in the base's coordinates, that brings the held point to `held` (3,)."""
+        frame = np.eye(4)
+        frame[:3, 3] = held - np.array(self.base)
+        cos, sin = np.cos(BASE_TURN), np.sin(BASE_TURN)
+        to_base = np.array([[cos, sin, 0.0, 0.0], [-sin, cos, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+        result: Floats = to_base @ frame @ GRIP
+        return result
+
+    def first_posture(self, held: Floats) -> kinematics.Posture:
+        """Return the posture to start in: turned towards the held point (3,), then as near to rest as can be."""
+        way = held - np.array(self.base)
+        start = kinematics.READY.copy()
+        start[0] = np.arctan2(way[1], way[0]) - BASE_TURN
+        wanted = self.hand_frame(held)
+        return kinematics.solve(wanted, kinematics.solve(wanted, start, kinematics.READY).angles, kinematics.READY)
+
+
+class _OnPanda(HeldTool):
+    """A tool in the hand of a Panda.
+
+    In each control step inverse kinematics finds the posture for the commanded point, going on from the last one, and
+    the joints' reference goes there at even speed. In each physics step torques follow the reference as a spring and a
+    damper would, with the arm's own inertia and weight known (computed torque; Spong, Hutchinson, Vidyasagar 2006).
+    """
+
+    def __init__(self, world: int | None, body: int, arm: PandaArm, pose: Sequence[float]) -> None:
+        super().__init__()
+        self.world, self.body, self.arm = world, body, arm
+        names = self._link_names()
+        self.tool_link = names.index(TOOL_LINK)
+        self._joints = list(range(len(kinematics.LOWEST)))
+        self._command = np.array(pose, dtype=np.float64)
+        posture = arm.first_posture(self._command)
+        self.report.unreachable_steps += not posture.reached
+        self._reference = posture.angles
+        self._speed = np.zeros(len(self._joints))
+        for joint, angle in zip(self._joints, posture.angles.tolist(), strict=True):
+            pybullet.resetJointState(body, joint, angle, physicsClientId=world)
+        pybullet.setJointMotorControlArray(
+            body, self._joints, pybullet.VELOCITY_CONTROL, forces=[0.0] * len(self._joints), physicsClientId=world
+        )
+        self._scene, self._objects = self._other_bodies()
+        self._colliding = self._link_pairs()
+
+    def drive(self, velocity: Sequence[float]) -> None:
+        """Set the joints' speeds for the next control step."""
+        period, now = self.arm.clock.control_period, np.array(self.read())
+        wanted = self._command + period * np.array(velocity)
+        away = wanted - now
+        wanted = now + away * min(1.0, LEASH / max(float(np.linalg.norm(away)), 1e-9))
+        posture = kinematics.solve(self.arm.hand_frame(wanted), self._reference, kinematics.READY)
+        speed = (posture.angles - self._reference) / period
+        haste = float((np.abs(speed) / kinematics.FASTEST).max())
+        self._speed = speed / max(1.0, haste)
+        self._command = wanted
+        self.report.unreachable_steps += not posture.reached
+        self.report.joint_limit_steps += bool(posture.at_limit.any())
+        self.report.velocity_limit_steps += haste > 1.0
+
+    def advance(self, steps: int) -> None:
+        """Make so many physics steps; then look at what happened."""
+        duration, strained = self.arm.clock.period, False
+        for _ in range(steps):
+            states = pybullet.getJointStates(self.body, self._joints, self.world)
+            angles, speeds = (np.array([state[entry] for state in states]) for entry in (0, 1))
+            self._reference = self._reference + duration * self._speed
+            wanted = STIFFNESS * (self._reference - angles) + DAMPING * (self._speed - speeds)
+            torque = np.array(
+                pybullet.calculateInverseDynamics(
+                    self.body, angles.tolist(), speeds.tolist(), wanted.tolist(), physicsClientId=self.world
+                )
+            )
+            allowed = np.clip(torque, -kinematics.STRONGEST, kinematics.STRONGEST)
+            strained |= bool((allowed != torque).any())
+            pybullet.setJointMotorControlArray(
+                self.body,
+                self._joints,
+                pybullet.TORQUE_CONTROL,
+                forces=allowed.tolist(),
+                physicsClientId=self.world,
+            )
+            pybullet.stepSimulation(self.world)
+        self.report.torque_limit_steps += strained
+        self._look()
+
+    def read(self) -> list[float]:
+        """Return the place of the held point."""
+        state = pybullet.getLinkState(
+            self.body, self.tool_link, computeForwardKinematics=True, physicsClientId=self.world
+        )
+        return list(state[4])
+
+    def _look(self) -> None:
+        """Count what happened in the control step that has just ended."""
+        report = self.report
+        error = float(np.linalg.norm(self._command - np.array(self.read())))
+        report.steps += 1
+        report.tracking_error_sum += error
+        report.tracking_error_max = max(report.tracking_error_max, error)
+        report.scene_contact_steps += self._touches(self._scene)
+        report.object_contact_steps += self._touches(self._objects)
+        report.self_collision_steps += any(
+            pybullet.getClosestPoints(self.body, self.body, -OVERLAP, first, second, physicsClientId=self.world)
+            for first, second in self._colliding
+        )
+
+    def _touches(self, bodies: Iterable[int]) -> bool:
+        """Tell whether a link of the arm that moves, the tool excepted, touches one of `bodies`."""
+        return any(
+            point[3] not in (-1, self.tool_link) and point[8] < 0.0
+            for body in bodies
+            for point in pybullet.getContactPoints(self.body, body, physicsClientId=self.world)
+        )
+
+    def _link_names(self) -> list[str]:
+        count = pybullet.getNumJoints(self.body, self.world)
+        return [pybullet.getJointInfo(self.body, link, self.world)[12].decode() for link in range(count)]
+
+    def _other_bodies(self) -> tuple[list[int], list[int]]:
+        """Return the fixed and the loose bodies of the world."""
+        count = pybullet.getNumBodies(self.world)
+        others = {pybullet.getBodyUniqueId(index, self.world) for index in range(count)} - {self.body}
+        fixed = {body for body in others if pybullet.getDynamicsInfo(body, -1, self.world)[0] == 0.0}
+        return sorted(fixed), sorted(others - fixed)
+
+    def _link_pairs(self) -> list[tuple[int, int]]:
+        """Return the pairs of links that should never overlap: those far apart along the arm.
+
+        The links behind the wrist's last joints are rigid and close together; each is looked at beside the first five.
+        """
+        forearm, count = 4, pybullet.getNumJoints(self.body, self.world)
+        near = [(first, second) for first in range(-1, forearm) for second in range(first + 3, count)]
+        return [pair for pair in near if pair[1] < self.tool_link or pair[0] < forearm - 1]
+
+
+def model_with_tool(tool: ToolShape) -> str:
+    """Return PyBullet's own model of the Panda (URDF) with closed fingers and a tool on its post in them."""
+    root = ElementTree.parse(MODEL).getroot()
+    for mesh in root.iter("mesh"):
+        mesh.set("filename", mesh.get("filename", "").replace("package:/", str(MODEL.parent)))
+    for name in ("panda_grasptarget", "panda_grasptarget_hand"):
+        for element in [entry for entry in root if entry.get("name") == name]:
+            root.remove(element)
+    for joint in root.iter("joint"):
+        if joint.get("type") == "prismatic":
+            _close(joint)
+    root.append(_tool_link(tool))
+    root.append(_tool_joint())
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _close(joint: ElementTree.Element) -> None:
+    """Fix a finger where it touches the post."""
+    joint.set("type", "fixed")
+    origin, axis = joint.find("origin"), joint.find("axis")
+    assert origin is not None, "a finger has a place"
+    assert axis is not None, "a finger has an axis"
+    place = np.array(origin.get("xyz", "").split(), dtype=np.float64)
+    way = np.array(axis.get("xyz", "").split(), dtype=np.float64)
+    origin.set("xyz", _numbers(place + FINGER_OPENING * way))
+
+
+def _tool_link(tool: ToolShape) -> ElementTree.Element:
+    """Return the link of the tool, whose frame is that of the held point, with the post."""
+    half_extents = [*tool.half_extents, *(half for half, _ in _POST)]
+    centres = [*tool.centres, *(centre for _, centre in _POST)]
+    rotations = [*tool.rotations, *((0.0, 0.0, 0.0, 1.0) for _ in _POST)]
+    volumes = np.prod(half_extents, axis=1)
+    link = ElementTree.Element("link", name=TOOL_LINK)
+    inertial = ElementTree.SubElement(link, "inertial")
+    ElementTree.SubElement(inertial, "origin", xyz=_numbers(volumes @ np.array(centres) / volumes.sum()))
+    ElementTree.SubElement(inertial, "mass", value=repr(tool.mass))
+    ElementTree.SubElement(inertial, "inertia", ixx="1", ixy="0", ixz="0", iyy="1", iyz="0", izz="1")
+    for half, centre, rotation in zip(half_extents, centres, rotations, strict=True):
+        for kind in ("visual", "collision"):
+            part = ElementTree.SubElement(link, kind)
+            turns = pybullet.getEulerFromQuaternion(rotation)
+            ElementTree.SubElement(part, "origin", xyz=_numbers(centre), rpy=_numbers(turns))
+            shape = ElementTree.SubElement(part, "geometry")
+            ElementTree.SubElement(shape, "box", size=_numbers(2.0 * np.array(half)))
+    return link
+
+
+def _tool_joint() -> ElementTree.Element:
+    """Return the rigid joint between hand and held point."""
+    held = np.linalg.inv(GRIP)
+    roll = np.arctan2(held[2, 1], held[2, 2])
+    pitch = np.arctan2(-held[2, 0], np.hypot(held[0, 0], held[1, 0]))
+    yaw = np.arctan2(held[1, 0], held[0, 0])
+    joint = ElementTree.Element("joint", name=f"{TOOL_LINK}_joint", type="fixed")
+    ElementTree.SubElement(joint, "parent", link="panda_hand")
+    ElementTree.SubElement(joint, "child", link=TOOL_LINK)
+    ElementTree.SubElement(joint, "origin", xyz=_numbers(held[:3, 3]), rpy=_numbers((roll, pitch, yaw)))
+    return joint
+
+
+_POST = (
+    (
+        (POST_HALF_WIDTH, POST_HALF_WIDTH, 0.5 * (GRIP_UP + POST_HALF_WIDTH + FOOT_HALF_HEIGHT)),
+        (0.0, -GRIP_BACK, 0.5 * (GRIP_UP + POST_HALF_WIDTH - FOOT_HALF_HEIGHT)),
+    ),
+    ((FOOT_HALF_HEIGHT, 0.5 * GRIP_BACK, FOOT_HALF_HEIGHT), (0.0, -0.5 * GRIP_BACK, 0.0)),
+)
+"""Half extents and centre of the post and of the bar that leads to it, in the frame of the held point, m (ours)."""
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -72,6 +72,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_report(_add(commands, "report", "write one page that tells everything a results folder holds", _report))
     _add_reproduce(_add(commands, "reproduce", "run what figures of the paper need, then draw them", _reproduce))
     _add_render(_add(commands, "render", "draw what a policy does, as an animation or a picture", _render))
+    _add_deploy(_add(commands, "deploy", "try a policy and its tools on a simulated robot arm", _deploy))
     _add_bench(_add(commands, "bench", "measure speed on this machine", _bench))
     return parser
 
@@ -202,6 +203,26 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="ends in .gif or .png")
     parser.add_argument("--episodes", type=_whole_number, default=4, metavar="N", help="default: 4")
     parser.add_argument("--seed", type=_whole_number, default=0, help="of random behaviour; default: 0")
+
+
+def _add_deploy(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--policy", type=Path, required=True, metavar="CELL", help="a finished cell's folder")
+    parser.add_argument("--task", metavar="T", help="default: the task of --policy")
+    parser.add_argument(
+        "--protocol", action="store_true", help="the paper's Table 1: five trials of each tool, and the grid of starts"
+    )
+    parser.add_argument("--tool", nargs="+", type=_whole_number, default=[], metavar="N", help="default: all of them")
+    parser.add_argument("--trials", type=_whole_number, metavar="N", help="of each tool; default: 1")
+    parser.add_argument("--arm", help="panda (default), or ideal: the gantry of training")
+    parser.add_argument(
+        "--observation-noise", type=float, metavar="M", help="deviation of lengths, m; default: 0, protocol 0.002"
+    )
+    parser.add_argument("--latency", type=_whole_number, metavar="STEPS", help="default: 0, protocol 1")
+    parser.add_argument("--friction", type=float, metavar="SHARE", help="largest change; default: 0, protocol 0.2")
+    parser.add_argument("--mass", type=float, metavar="SHARE", help="largest change; default: 0, protocol 0.2")
+    parser.add_argument("--seed", type=_whole_number, default=0, help="of noise and changes; default: 0")
+    parser.add_argument("--no-gifs", action="store_true", help="do not draw the trials")
+    parser.add_argument("--out", type=Path, default=DEFAULT_RESULTS, metavar="DIR", help=f"default: {DEFAULT_RESULTS}")
 
 
 def _add_bench(parser: argparse.ArgumentParser) -> None:
@@ -365,6 +386,31 @@ def _render(options: argparse.Namespace, console: Console) -> int:
         behaviour = RandomBehaviour(task, generator(options.seed, "render")) if random else task.script()
         line = render(task, behaviour, options.out, options.episodes)
     console.print(line, markup=False, highlight=False, soft_wrap=True)
+    return 0
+
+
+def _deploy(options: argparse.Namespace, console: Console) -> int:
+    from dataclasses import replace
+
+    from codesign_bench.deployment.conditions import TRIAL, Conditions
+    from codesign_bench.deployment.deploy import Order, deploy, policy_and_task
+
+    if options.protocol and (options.tool or options.trials is not None):
+        raise UserError("deploy: --protocol sets tools and trials itself; leave out --tool and --trials")
+    names = ("arm", "observation_noise", "latency", "friction", "mass")
+    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    conditions = replace(TRIAL if options.protocol else Conditions(), **given)
+    conditions.check()
+    order = Order(
+        conditions,
+        tools=tuple(options.tool),
+        trials=1 if options.trials is None else options.trials,
+        protocol=options.protocol,
+        seed=options.seed,
+        gifs=not options.no_gifs,
+    )
+    policy, task = policy_and_task(options.policy, options.task)
+    deploy(task, policy, order, options.out, _printer(console), str(options.policy))
     return 0
 
 

@@ -78,7 +78,7 @@ def render(task: Task, behaviour: Behaviour, path: Path, episodes: int = 4) -> s
     stride = _stride(task) if animated else max(1, task.horizon // SHEET_SAMPLES)
     moments = list(_play(task, behaviour, episodes, stride))
     solved = sum("success" in caption for caption in moments[-1].captions)
-    content = _animation(task, moments) if animated else _sheet(moments)
+    content = animation(moments, stride * task.control_period) if animated else _sheet(moments)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_bytes(path, content)
@@ -134,11 +134,10 @@ def _stride(task: Task) -> int:
     return max(1, round(1.0 / (FRAMES_PER_SECOND * task.control_period)))
 
 
-def _animation(task: Task, moments: list[Moment]) -> bytes:
-    """Return a GIF that plays in simulated time and stands still at its end."""
+def animation(moments: list[Moment], period: float) -> bytes:
+    """Return a GIF with a moment every `period` s that stands still at its end."""
     pictures = [Image.fromarray(np.concatenate(_captioned(moment), axis=1)) for moment in moments]
-    period = 1000.0 * _stride(task) * task.control_period
-    durations = [round(period)] * (len(pictures) - 1) + [round(1000.0 * END_SECONDS)]
+    durations = [round(1000.0 * period)] * (len(pictures) - 1) + [round(1000.0 * END_SECONDS)]
     data = io.BytesIO()
     first, *rest = [picture.convert("P", palette=Image.Palette.ADAPTIVE) for picture in pictures]
     first.save(data, "GIF", save_all=True, append_images=rest, duration=durations, loop=0, disposal=1)

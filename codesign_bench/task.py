@@ -19,7 +19,7 @@ from codesign_bench.registry import load, names
 from codesign_bench.seeding import generator
 
 if TYPE_CHECKING:
-    from codesign_bench.deployment.robot import DeployedSimulator
+    from codesign_bench.deployment.robot import DeployedSimulator, RobotTrials
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -357,6 +357,14 @@ class Task(ABC):
 
     def make_deployed_simulator(self, num_slots: int, arm: str) -> DeployedSimulator:
         """Return a simulator with `num_slots` slots whose tools are held by `arm`, one of `deployment.robot.ARMS`.
+
+        Raises:
+            UserError: the task has none.
+        """
+        raise UserError(f"task '{self.name}' has no deployment; choose from: {', '.join(deployable_tasks())}")
+
+    def robot_trials(self) -> RobotTrials:
+        """Return the instances of the paper's evaluation on a real robot.
 
         Raises:
             UserError: the task has none.

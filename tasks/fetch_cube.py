@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from codesign_bench.deployment.robot import DeployedSimulator
-from codesign_bench.paper_tables import BOX_SCENES, PROTOCOL
+from codesign_bench.deployment.robot import DeployedSimulator, RobotTrials
+from codesign_bench.paper_tables import BOX_SCENES, PROTOCOL, REAL_ROBOT
 from codesign_bench.task import (
     Behaviour,
     Booleans,
@@ -237,6 +237,21 @@ class FetchCube(Task):
     def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
         """Return a simulator of `num_slots` cubes and tools."""
         return _FetchCubeSimulator(num_slots, self.state_space.size, CLOCK.refined(refinement))
+
+    def robot_trials(self) -> RobotTrials:
+        """Return the four starts of the paper's tools and its 3 x 4 grid, in our frame.
+
+        The real robot's frame is turned by half a turn about the vertical, (x, y) -> (-x, -y): that makes y point away
+        from the base and keeps left and right apart, as a mirror would not. The paper does not say where its grid lies:
+        ours is centred on the region of starts, (0, 0.65) m, so that the row nearest to the robot passes the start of
+        tool 2; at both sides it reaches 3 cm beyond the region.
+        """
+        own = -np.array(REAL_ROBOT.fetch_cube_starts)[:, :2]
+        depth, width = REAL_ROBOT.grid_extent
+        rows, columns = REAL_ROBOT.grid_shape
+        y = 0.5 * sum(CUBE_Y) + np.linspace(0.5 * depth, -0.5 * depth, rows)
+        x = 0.5 * sum(CUBE_X) + np.linspace(-0.5 * width, 0.5 * width, columns)
+        return RobotTrials(own, np.stack(np.meshgrid(x, y), axis=-1), GOAL_DISTANCE)
 
     def make_deployed_simulator(self, num_slots: int, arm: str) -> DeployedSimulator:
         """Return a simulator of `num_slots` cubes whose tools are held by `arm`, seen from the side."""

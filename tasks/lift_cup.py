@@ -10,8 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from codesign_bench.deployment.robot import DeployedSimulator
-from codesign_bench.paper_tables import BOX_SCENES
+from codesign_bench.deployment.robot import DeployedSimulator, RobotTrials
+from codesign_bench.paper_tables import BOX_SCENES, REAL_ROBOT
 from codesign_bench.task import (
     Behaviour,
     Booleans,
@@ -224,6 +224,10 @@ class LiftCup(Task):
     def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
         """Return a simulator of `num_slots` cups and forks."""
         return _LiftCupSimulator(num_slots, self.state_space.size, CLOCK.refined(refinement))
+
+    def robot_trials(self) -> RobotTrials:
+        """Return the four cups of the paper's tools; there is no grid."""
+        return RobotTrials(np.array(REAL_ROBOT.lift_cup_sizes), np.zeros((0, 0, 2)), SUCCESS_HEIGHT)
 
     def make_deployed_simulator(self, num_slots: int, arm: str) -> DeployedSimulator:
         """Return a simulator of `num_slots` cups whose forks are held by `arm`, seen from the side."""

@@ -1,11 +1,14 @@
-"""What deployment asks of a task's simulator beyond `Simulator`: other physics, and what happened to the arm."""
+"""What deployment asks of a task beyond `Simulator`: trials, other physics, and what happened to the arm.
+
+Shapes: `T` tools, `R` rows and `C` columns of a grid, `I` instance.
+"""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
 
-from codesign_bench.task import Simulator
+from codesign_bench.task import Floats, Simulator
 
 IDEAL, PANDA = "ideal", "panda"
 ARMS = (PANDA, IDEAL)
@@ -41,6 +44,18 @@ class ArmReport:
     def tracking_error_mean(self) -> float:
         """Mean distance between commanded and reached held point, m; 0 before the first step."""
         return self.tracking_error_sum / max(self.steps, 1)
+
+
+@dataclass(frozen=True)
+class RobotTrials:
+    """The instances of a task on which the paper tried its tools on the real robot, in the task's own frame."""
+
+    own: Floats
+    """(T, I): what each of T tools is designed for."""
+    grid: Floats
+    """(R, C, I): on which every tool is tried, the row that is farthest from the robot first; R is 0 without a grid."""
+    success_outcome: float
+    """The task's outcome at which an episode succeeds, in the outcome's unit."""
 
 
 class DeployedSimulator(Simulator):

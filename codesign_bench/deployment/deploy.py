@@ -1,0 +1,128 @@
+"""`codesign-bench deploy`: run trials of a policy on a simulated arm, and write tables and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from codesign_bench import __version__
+from codesign_bench.deployment.conditions import Conditions
+from codesign_bench.deployment.pictures import Film
+from codesign_bench.deployment.protocol import Trial, grid_trials, own_trials
+from codesign_bench.deployment.rollout import Deployment
+from codesign_bench.deployment.tables import (
+    FOLDER,
+    PICTURES_FOLDER,
+    PROTOCOL_FILE,
+    SUMMARY_SUFFIX,
+    TRIALS_FILE,
+    row,
+    summarise,
+)
+from codesign_bench.errors import UserError
+from codesign_bench.files import write_bytes, write_json
+from codesign_bench.paper_tables import REAL_ROBOT
+from codesign_bench.policy_files import load_policy
+from codesign_bench.results import open_folder, read_cell, write_rows
+from codesign_bench.seeding import generator
+from codesign_bench.task import Behaviour, Task, load_task
+
+
+@dataclass(frozen=True)
+class Order:
+    """What to run."""
+
+    conditions: Conditions
+    tools: tuple[int, ...] = ()
+    """Numbers of tools, from 1; empty: all."""
+    trials: int = 1
+    """Of each tool on its own instance."""
+    protocol: bool = False
+    """The paper's: its number of trials, and every tool on the grid."""
+    seed: int = 0
+    gifs: bool = True
+    """Whether to draw every trial."""
+
+
+def policy_and_task(cell: Path, name: str | None) -> tuple[Behaviour, Task]:
+    """Return the final policy of a cell and its task.
+
+    Raises:
+        UserError: it is no finished cell, or was trained on another task than `name`.
+    """
+    policy = load_policy(cell)
+    trained_on = (read_cell(cell) or {})["task"]
+    if name not in (None, trained_on):
+        raise UserError(f"--policy {cell}: trained on '{trained_on}', not on '{name}'")
+    return policy, load_task(trained_on)
+
+
+def deploy(
+    task: Task, policy: Behaviour, order: Order, out: Path, say: Callable[[str], None], source: str = ""
+) -> list[dict[str, Any]]:
+    """Run the trials of `order`, write them below `out` and return one row each.
+
+    Args:
+        task: the policy's.
+        policy: makes the tools and controls them.
+        order: what to run.
+        out: a results folder; the files lie in `out`/deployment/<task>.
+        say: tells the user a line.
+        source: where the policy comes from, for the summary.
+
+    Raises:
+        UserError: the task cannot be deployed, a number of `order` means nothing, or `out` cannot be written.
+    """
+    if order.trials < 1:
+        raise UserError(f"--trials must be at least 1, not {order.trials}")
+    settings = task.robot_trials()
+    tools = order.tools or tuple(range(1, len(settings.own) + 1))
+    planned = list(own_trials(settings, tools, REAL_ROBOT.trials if order.protocol else order.trials))
+    planned += grid_trials(settings, tools) if order.protocol else []
+    deployment = Deployment(task, policy, order.conditions)
+    open_folder(out)
+    folder = out / FOLDER / task.name
+    path = folder / (PROTOCOL_FILE if order.protocol else TRIALS_FILE)
+    (folder / PICTURES_FOLDER).mkdir(parents=True, exist_ok=True)
+    designs = {tool: deployment.design(settings.own[tool - 1]) for tool in tools}
+    rows = []
+    for trial in planned:
+        film = Film(f"{task.title}, tool {trial.tool}") if order.gifs else None
+        rng = generator(order.seed, f"deploy {task.name} {trial.name}")
+        rollout = deployment.play(trial.instance, designs[trial.tool], rng, film)
+        where = {name: getattr(trial, name) for name in ("kind", "tool", "trial", "row", "column")}
+        rows.append(row(task, settings, trial.instance, rollout, **where))
+        if film is not None:
+            write_bytes(folder / PICTURES_FOLDER / f"{trial.name}.gif", film.gif(task.control_period))
+        say(_line(trial, rows[-1]))
+    write_rows(path, rows)
+    named = [dict(zip(task.design_space.names, values.tolist(), strict=True)) for values in _units(task, designs)]
+    write_json(
+        path.with_suffix(SUMMARY_SUFFIX),
+        {
+            "version": __version__,
+            "task": task.name,
+            "policy": source,
+            "seed": order.seed,
+            "conditions": asdict(order.conditions),
+            "max_steps": REAL_ROBOT.max_steps,
+            "designs": dict(zip(map(str, designs), named, strict=True)),
+            "tools": summarise(rows),
+        },
+    )
+    say(str(path))
+    return rows
+
+
+def _units(task: Task, designs: dict[int, Any]) -> Sequence[Any]:
+    return [task.design_space.from_unit(design) for design in designs.values()]
+
+
+def _line(trial: Trial, values: dict[str, Any]) -> str:
+    """Return what the user is told of a trial."""
+    end = "success" if values["success"] else "nearly" if values["near"] else "lost" if values["lost"] else "failure"
+    incidents = [f"{name} {values[name]}" for name in values if name.endswith("_steps") and values[name]]
+    error = f"tracking error {values['tracking_error_mean_mm']:.1f} mm, at most {values['tracking_error_max_mm']:.1f}"
+    return f"{trial.name}: {end} after {values['steps']} steps; {error}; {', '.join(incidents) or 'no incidents'}"

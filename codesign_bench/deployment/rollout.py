@@ -1,0 +1,103 @@
+"""One trial: a policy and a tool on a simulated arm.
+
+Shapes: `I` instance, `D` design, `O` observation, `C` control.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from codesign_bench.deployment.conditions import Conditions, Physics
+from codesign_bench.deployment.robot import ArmReport
+from codesign_bench.episodes import Episodes
+from codesign_bench.paper_tables import REAL_ROBOT
+from codesign_bench.task import Behaviour, Floats, Singles, Task
+
+SLOT = np.array([0])
+METRE = "m"
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """How a trial went."""
+
+    success: bool
+    failure: bool
+    """Whether it was lost for good."""
+    outcome: float
+    """The task's outcome at its end, in the outcome's unit."""
+    steps: int
+    """Control steps."""
+    physics: Physics
+    arm: ArmReport
+
+
+class Deployment:
+    """A task's policy on an arm under given conditions, trial after trial."""
+
+    def __init__(self, task: Task, policy: Behaviour, conditions: Conditions) -> None:
+        conditions.check()
+        self.task, self.policy, self.conditions = task, policy, conditions
+        self.simulator = task.make_deployed_simulator(1, conditions.arm)
+        self.episodes = Episodes(task, 1, simulator=self.simulator)
+        self._lengths = np.array([unit == METRE for unit in task.state_space.units])
+
+    def design(self, instance: Floats) -> Floats:
+        """Return the design (D,) in [-1, 1] that the policy makes for an instance (I,), measured without noise."""
+        self.episodes.begin(SLOT, instance[None])
+        design: Floats = np.clip(np.asarray(self.policy.design(self.episodes.observation)[0], dtype=np.float64), -1, 1)
+        return design
+
+    def play(
+        self,
+        instance: Floats,
+        design: Floats,
+        rng: np.random.Generator,
+        watch: Callable[[Episodes], None] | None = None,
+    ) -> Rollout:
+        """Try a design (D,) in [-1, 1] on an instance (I,), until it ends or the paper's number of steps is over.
+
+        Args:
+            instance: in the instance space's units.
+            design: the tool, whatever instance it was made for.
+            rng: draws noise and physics.
+            watch: called right after the design step and after every control step.
+        """
+        episodes, physics = self.episodes, Physics.draw(self.conditions, rng)
+        episodes.begin(SLOT, instance[None])
+        episodes.design(SLOT, design[None])
+        self.simulator.perturb(0, physics.friction, physics.mass)
+        seen: deque[Singles] = deque(maxlen=self.conditions.latency + 1)
+        steps, over = 0, False
+        if watch is not None:
+            watch(episodes)
+        while not over and steps < REAL_ROBOT.max_steps:
+            control = np.asarray(self.policy.act(self._observe(seen, rng)), dtype=np.float64)
+            _, terminated, truncated = episodes.control(SLOT, control)
+            steps, over = steps + 1, bool(terminated[0] | truncated[0])
+            if watch is not None:
+                watch(episodes)
+        simulator = self.simulator
+        return Rollout(
+            success=bool(simulator.success[0]),
+            failure=bool(simulator.failure[0]),
+            outcome=float(simulator.outcome[0]),
+            steps=steps,
+            physics=physics,
+            arm=simulator.arm_report(0),
+        )
+
+    def _observe(self, seen: deque[Singles], rng: np.random.Generator) -> Singles:
+        """Return what the policy is told (1, O): a state that is late and noisy; goal, design and phase are neither."""
+        result = self.episodes.observation.copy()
+        state = result[:, self.episodes.layout.state]
+        if self.conditions.observation_noise > 0.0:
+            noise = self.conditions.observation_noise * rng.standard_normal(state.shape) * self._lengths
+            state = np.clip(state + noise, self.task.state_space.low, self.task.state_space.high).astype(np.float32)
+        seen.append(state.copy())
+        result[:, self.episodes.layout.state] = seen[0]
+        return result

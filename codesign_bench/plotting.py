@@ -97,9 +97,17 @@ def _baseline_sweep(results: Path, say: Callable[[str], None], wanted: bool) -> 
     return load_sweep(results)
 
 
+def _deployment(results: Path, say: Callable[[str], None], wanted: bool) -> pd.DataFrame:
+    from codesign_bench.deployment.tables import load_deployment
+
+    del say, wanted  # trials come from `deploy` alone
+    return load_deployment(results)
+
+
 SOURCES: Mapping[str, Callable[[Path, Callable[[str], None], bool], pd.DataFrame]] = {
     CURVES: _curves,
     "baseline_sweep": _baseline_sweep,
+    "deployment": _deployment,
     "design_sensitivity": _sensitivity,
     "designed_tools": _designed_tools,
     "evaluations": _evaluations,

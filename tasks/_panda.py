@@ -40,6 +40,8 @@ POST_HALF_WIDTH = 0.01
 FOOT_HALF_HEIGHT = 0.005
 """Of the bar between post and held point, m (ours): as thin as the thinnest tool."""
 TOOL_LINK = "tool"
+FOREARM_LINK = 3
+"""Links further on are the wrist's and the hand's, rigid or too close together to run into each other."""
 
 STIFFNESS = 900.0
 """Joint acceleration per error, 1/s^2 (ours): about 3000 N/m at the hand, the stiffest that Franka's own allows."""
@@ -224,13 +226,9 @@ class _OnPanda(HeldTool):
         return sorted(fixed), sorted(others - fixed)
 
     def _link_pairs(self) -> list[tuple[int, int]]:
-        """Return the pairs of links that should never overlap: those far apart along the arm.
-
-        The links behind the wrist's last joints are rigid and close together; each is looked at beside the first five.
-        """
-        forearm, count = 4, pybullet.getNumJoints(self.body, self.world)
-        near = [(first, second) for first in range(-1, forearm) for second in range(first + 3, count)]
-        return [pair for pair in near if pair[1] < self.tool_link or pair[0] < forearm - 1]
+        """Return the pairs of links that should never overlap: base or arm, and anything three or more links on."""
+        count = pybullet.getNumJoints(self.body, self.world)
+        return [(first, second) for first in range(-1, FOREARM_LINK + 1) for second in range(first + 3, count)]
 
 
 def model_with_tool(tool: ToolShape) -> str:

@@ -90,8 +90,8 @@ PLAY = 0.25 * RIM_WIDTH
 START_POTENTIAL = -1.0
 """Of every episode's start: the one of prongs 0.25 m away (ours)."""
 
-ARM_BASE = (0.0, 0.95, 0.4)
-"""Where a robot's base stands, m (ours): 0.4 m above the table and 0.7 m behind the cup.
+ARM_BASE = (0.0, 1.0, 0.3)
+"""Where a robot's base stands, m (ours): 0.3 m above the table and 0.65 m before the cup.
 
 From there a Panda reaches from below the rims up to the lifted cup; the paper does not tell where its own stood.
 """

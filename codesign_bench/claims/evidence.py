@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from codesign_bench.claims.claim import Lacking
+from codesign_bench.deployment.tables import load_deployment
 from codesign_bench.errors import UserError
 from codesign_bench.profiles import DEFAULT_PROFILE
 from codesign_bench.results import find_cells, load_evaluations, load_results
@@ -36,6 +37,8 @@ class Evidence:
     """As `codesign_bench.sensitivity.measure` gives it, several tasks below each other."""
     outside: pd.DataFrame = field(default_factory=pd.DataFrame)
     """As `codesign_bench.outside.load_or_measure` gives it."""
+    deployment: pd.DataFrame = field(default_factory=pd.DataFrame)
+    """As `codesign_bench.deployment.tables.load_deployment` gives it."""
     design_widths: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Task -> column of a design parameter in `evaluations` -> width of its range, in the parameter's unit."""
     profile: str = DEFAULT_PROFILE
@@ -131,10 +134,11 @@ def load_evidence(results: Path, measure: Measure | None = None) -> Evidence:
     what = measure or Measure()
     sensitivity = _read(what.sensitivity, results, ("tool", "goal", "success"))
     outside = _read(what.outside_region, results, ("task", "method", "seed", "instance", "success"))
+    deployment = _read(load_deployment, results, ("task", "kind", "tool", "row", "column", "success"))
     if evaluations.empty and sensitivity.empty:
         raise UserError(f"no finished cell in '{results}' yet; make some with: codesign-bench run --out {results}")
     profile = profiles.pop() if len(profiles) == 1 else DEFAULT_PROFILE
-    return Evidence(curves, evaluations, sensitivity, outside, _design_widths(evaluations), profile)
+    return Evidence(curves, evaluations, sensitivity, outside, deployment, _design_widths(evaluations), profile)
 
 
 def _read(read: Callable[[Path], pd.DataFrame], results: Path, needed: Sequence[str]) -> pd.DataFrame:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from codesign_bench.claims import comparison, fine_tuning, tools, tradeoff, zero_shot
+from codesign_bench.claims import comparison, deployment, fine_tuning, tools, tradeoff, zero_shot
 from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.shared import run_command
 from codesign_bench.paper_tables import PROTOCOL, SCENES
@@ -23,9 +23,11 @@ TOOLS = "Evaluating sample efficiency; fig:qualitative_tools"
 ENVIRONMENTS = "Experiments, simulated environments; tab:real_exp for fetch cube"
 ZERO_SHOT = "Generalization to unseen task variations, zero-shot; fig:interpolation_curve"
 FINE_TUNING = "Generalization to unseen task variations, fine-tuning; fig:finetuning"
+REAL = "Evaluation on a real robot; tab:real_exp, fig:detailed_other_inits_results"
 TRADEOFF = "Trading off design and control complexity; fig:control_design_ratio"
 
 FETCH = "fetch_cube"
+LIFT = "lift_cup"
 CATCH = "catch_balls"
 FRACTIONS, ALPHAS = PROTOCOL.cutout_fractions, PROTOCOL.alphas
 FEW_SEEDS = PROTOCOL.seeds_generalisation
@@ -185,5 +187,20 @@ CLAIMS: tuple[Claim, ...] = (
         "a smaller alpha, with its larger tools, needs less movement",
         TRADEOFF,
         tradeoff.rises_with_alpha(CATCH, OURS, ALPHAS, tradeoff.EFFORT, TRADEOFFS),
+    ),
+    *(
+        Claim(
+            f"deployment.own_instance.{task}",
+            f"on an arm, policies succeed on the instance of {task} that their tool was designed for",
+            REAL,
+            deployment.own_instance_solved(task, OURS),
+        )
+        for task in (FETCH, LIFT)
+    ),
+    Claim(
+        "deployment.grid",
+        "on an arm, no tool solves the whole grid of the cube's starts",
+        REAL,
+        deployment.no_tool_solves_the_grid(FETCH, OURS),
     ),
 )

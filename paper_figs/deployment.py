@@ -31,7 +31,8 @@ NEAR = ("#E69F00", "n", f"failure within {100.0 * REAL_ROBOT.near_miss:.0f} cm o
 FAILURE = ("#D55E00", "F", "failure")
 """Green, orange and red of Okabe and Ito (2008), with a letter each, so that nobody needs the colours."""
 ROW_NAMES = {OWN: "own instance", GRID: "grid of starts"}
-TABLE_HEIGHT, MAP_HEIGHT = 1.0, 1.8
+NOTE = "Successes on the simulated arm (in brackets: the paper's, on the real one)"
+TABLE_HEIGHT, MAP_HEIGHT = 1.1, 1.8
 """In inches."""
 BASE_ROOM = 1.1
 """Height of the strip below a map in which the base is drawn, in fields."""
@@ -81,6 +82,7 @@ def draw(frame: pd.DataFrame) -> Figure:
         table.auto_set_font_size(False)
         table.set_fontsize(6)
         table.auto_set_column_width(list(range(len(header))))
+        axes.set_title(NOTE, fontsize=7)
         if tools:
             (bottom,) = below
             maps = bottom.subplots(1, len(tools), squeeze=False)[0]

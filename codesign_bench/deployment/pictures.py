@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from codesign_bench.episodes import Episodes
+from codesign_bench.paper_tables import REAL_ROBOT
 from codesign_bench.rendering import Moment, animation
 
 STRIDE = 3
@@ -19,7 +20,7 @@ class Film:
     def __call__(self, episodes: Episodes) -> None:
         """Take a picture, if it is time for one or the trial has ended."""
         simulator, steps = episodes.simulator, int(episodes.elapsed[0])
-        ended = bool(simulator.success[0] or simulator.failure[0])
+        ended = bool(simulator.success[0] or simulator.failure[0]) or steps == REAL_ROBOT.max_steps
         if steps % STRIDE == 0 or ended:
             end = "  success" if simulator.success[0] else "  lost" if simulator.failure[0] else ""
             self._moments.append(Moment([simulator.render(0)], [f"{self.title}  step {steps}{end}"], [False]))

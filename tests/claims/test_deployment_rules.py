@@ -30,15 +30,8 @@ def grid(*solved: Sequence[int]) -> Evidence:
     """Return trials on the grid: tool t solves the starts numbered `solved[t]` of twelve."""
     where = {"task": "fetch_cube", "kind": "grid"}
     rows = [
-        {
-            "task": "fetch_cube",
-            "kind": "grid",
-            "tool": tool,
-            "row": row,
-            "column": column,
-            "success": int(number in own),
-        }
-        for tool, own in enumerate(solved, start=1)
+        {**where, "tool": tool, "row": row, "column": column, "success": int(number in won)}
+        for tool, won in enumerate(solved, start=1)
         for number, (row, column) in enumerate(np.ndindex(3, 4))
     ]
     return Evidence(deployment=pd.DataFrame(rows))

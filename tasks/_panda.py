@@ -44,7 +44,7 @@ FOREARM_LINK = 3
 """Links further on are the wrist's and the hand's, rigid or too close together to run into each other."""
 
 STIFFNESS = 900.0
-"""Joint acceleration per error, 1/s^2 (ours): about 3000 N/m at the hand, the stiffest that Franka's own allows."""
+"""Joint acceleration per error, 1/s^2 (ours): of the order of 3000 N/m at the hand."""
 DAMPING = 2.0 * STIFFNESS**0.5
 """Joint acceleration per error of speed, 1/s (ours): critical."""
 LEASH = 0.03

@@ -15,7 +15,7 @@ from PIL import Image
 from codesign_bench import load_task
 from codesign_bench.cli import main
 from codesign_bench.deployment.conditions import TRIAL, Conditions, Physics
-from codesign_bench.deployment.deploy import Order, deploy
+from codesign_bench.deployment.deploy import Order, deploy, policy_and_task
 from codesign_bench.deployment.protocol import grid_trials, own_trials
 from codesign_bench.deployment.robot import IDEAL, PANDA
 from codesign_bench.deployment.rollout import Deployment
@@ -27,6 +27,7 @@ from codesign_bench.paper_tables import REAL_ROBOT
 from codesign_bench.seeding import generator
 from codesign_bench.task import Behaviour, Floats, Singles
 
+REFERENCE = Path(__file__).resolve().parent.parent / "results" / "reference"
 TASKS = ("fetch_cube", "lift_cup")
 NEAR_START = np.array([-0.211, 0.633])
 """Of tool 4, in the task's frame: the script fetches it."""
@@ -180,6 +181,31 @@ def test_a_cube_that_ends_within_5_cm_is_nearly_fetched() -> None:
     assert [(entry["success"], entry["near"]) for entry in rows] == [(1, 0), (0, 1), (0, 0)]
     (summary,) = summarise(rows)
     assert (summary["trials"], summary["successes"], summary["near"]) == (3, 1, 1)
+
+
+@pytest.mark.skipif(not REFERENCE.exists(), reason="a source distribution leaves the results out")
+def test_the_shipped_deployment_is_the_papers_whole_protocol() -> None:
+    frame = load_deployment(REFERENCE)
+    trials = frame.groupby(["task", "kind", "tool"]).size().unstack("tool")
+    assert trials.loc[("fetch_cube", "own")].tolist() == [5, 5, 5, 5]
+    assert trials.loc[("fetch_cube", "grid")].tolist() == [12, 12, 12, 12]
+    assert trials.loc[("lift_cup", "own")].tolist() == [5, 5, 5, 5]
+
+
+@pytest.mark.skipif(not REFERENCE.exists(), reason="a source distribution leaves the results out")
+@pytest.mark.parametrize(("name", "tool"), [("fetch_cube", 2), ("lift_cup", 4)])
+def test_a_shipped_policy_succeeds_on_the_panda_as_its_table_says(name: str, tool: int, tmp_path: Path) -> None:
+    policy, task = policy_and_task(REFERENCE / name / "gnn_ppo" / "default" / "seed-00", name)
+    (again,) = deploy(task, policy, Order(TRIAL, tools=(tool,), gifs=False), tmp_path, lambda line: None)
+    frame = load_deployment(REFERENCE)
+    told = frame[(frame["task"] == name) & (frame["kind"] == "own") & (frame["tool"] == tool) & (frame["trial"] == 1)]
+    assert again["success"] == told["success"].item() == 1
+    assert again["steps"] == pytest.approx(told["steps"].item(), abs=5), "another processor rounds otherwise"
+
+
+def test_a_policy_of_another_task_is_refused() -> None:
+    with pytest.raises(UserError, match="is no cell's folder"):
+        policy_and_task(Path("nowhere"), "fetch_cube")
 
 
 def test_without_trials_the_user_is_told_how_to_make_them(tmp_path: Path) -> None:

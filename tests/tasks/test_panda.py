@@ -104,7 +104,18 @@ def test_out_of_reach_is_counted_and_the_arm_stays_whole() -> None:
     assert (angles < kinematics.HIGHEST).all()
 
 
-def test_touching_the_table_with_the_hand_is_counted() -> None:
+def test_an_arm_folded_into_itself_is_counted() -> None:
+    folded = (0.0, 1.0, 0.0, -3.05, 0.0, 0.3, 0.78)
+    for angles, expected in ((kinematics.READY.tolist(), 0), (folded, 1)):
+        episodes = started()
+        held = episodes.simulator.held[0]
+        for joint, angle in enumerate(angles):
+            pybullet.resetJointState(held.body, joint, angle, physicsClientId=held.world)
+        held.advance(0)
+        assert report(episodes).self_collision_steps == expected
+
+
+def test_a_hand_that_touches_something_fixed_is_counted() -> None:
     episodes = started()
     held = episodes.simulator.held[0]
     slab = episodes.simulator.add_box(0, (0.2, 0.2, 0.05), (0.0, 0.45, 0.17))  # in the hand's way

@@ -75,7 +75,7 @@ def test_it_runs_what_is_missing_draws_and_does_nothing_twice(tmp_path: Path, mo
     def run() -> tuple[int, str]:
         console = Console(record=True, width=200, file=io.StringIO())
         code = reproduce(
-            ["toy"], profile="quick", results=tmp_path / "runs", figures=tmp_path / "figures", console=console, jobs=1
+            ["toy"], profile="laptop", results=tmp_path / "runs", figures=tmp_path / "figures", console=console, jobs=1
         )
         return code, console.export_text()
 

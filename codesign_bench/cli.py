@@ -170,6 +170,9 @@ def _add_plot(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("figures", nargs="*", metavar="FIGURE", help="default: every figure that the results allow")
     parser.add_argument("--results", type=Path, default=DEFAULT_RESULTS, metavar="DIR")
     parser.add_argument("--out", type=Path, default=DEFAULT_FIGURES, metavar="DIR", help=f"default: {DEFAULT_FIGURES}")
+    parser.add_argument(
+        "--compare", type=Path, metavar="DIR", help="draw learning curves of these results besides, dashed"
+    )
 
 
 def _add_verify(parser: argparse.ArgumentParser) -> None:
@@ -314,7 +317,7 @@ def _status(options: argparse.Namespace, console: Console) -> int:
 def _plot(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.plotting import draw_figures
 
-    draw_figures(options.figures, options.results, options.out, _printer(console))
+    draw_figures(options.figures, options.results, options.out, _printer(console), options.compare)
     return 0
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from codesign_bench.comparison import with_compared
 from codesign_bench.errors import UserError
 from codesign_bench.files import write_bytes
 from codesign_bench.registry import load_module, names
@@ -135,18 +136,31 @@ class Drawing:
     """Further files by their ending."""
 
 
-def draw_figures(wanted: Sequence[str], results: Path, out: Path, say: Callable[[str], None]) -> None:
+def draw_figures(
+    wanted: Sequence[str], results: Path, out: Path, say: Callable[[str], None], compare: Path | None = None
+) -> None:
     """Draw `wanted`, or every figure that the results allow, and tell the paths; the first figure's picture comes last.
+
+    Args:
+        wanted: names of figures; none: all.
+        results: where cells lie.
+        out: where figures go.
+        say: is told every path, and what is left out.
+        compare: further results, whose curves figures with `COMPARES` show besides.
 
     Raises:
         UserError: an unknown figure, a folder that cannot be written, or nothing that can be drawn.
     """
     modules = {name: load_module("paper_figs", name) for name in wanted or names("paper_figs")}
+    comparing = [name for name, module in modules.items() if getattr(module, "COMPARES", False)]
+    if compare is not None and not comparing:
+        choices = [name for name in names("paper_figs") if getattr(load_module("paper_figs", name), "COMPARES", False)]
+        raise UserError(f"--compare: {', '.join(wanted)} show no curves; choose from: {', '.join(choices)}")
     if not wanted and not results.is_dir():
         raise UserError(f"no results folder '{results}'; make one with: codesign-bench run --out {results}")
     make_folder(out)
     drawn: list[Path] = []
-    for drawing in _drawings(modules, results, say, bool(wanted)):
+    for drawing in _drawings(modules, results, say, bool(wanted), compare):
         drawn = [*save(drawing, out), *drawn]  # what comes first is told last
     if not drawn:
         raise UserError(f"the results in '{results}' allow no figure yet")
@@ -178,7 +192,11 @@ def csv_bytes(table: pd.DataFrame) -> bytes:
 
 
 def _drawings(
-    modules: Mapping[str, ModuleType], results: Path, say: Callable[[str], None], wanted: bool
+    modules: Mapping[str, ModuleType],
+    results: Path,
+    say: Callable[[str], None],
+    wanted: bool,
+    compare: Path | None = None,
 ) -> Iterator[Drawing]:
     """Yield the figures of `modules` one by one, and forget each before the next.
 
@@ -191,7 +209,10 @@ def _drawings(
         try:
             if source not in frames:
                 frames[source] = SOURCES[source](results, say, wanted)
-            drawing = _draw(name, module, frames[source])
+            frame = frames[source]
+            if compare is not None and getattr(module, "COMPARES", False):
+                frame = with_compared(frame, compare)
+            drawing = _draw(name, module, frame)
         except UserError as error:
             if wanted:
                 raise

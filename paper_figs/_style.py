@@ -11,6 +11,8 @@ from typing import Any, Literal
 
 import matplotlib as mpl
 
+from codesign_bench.comparison import is_compared, method_of
+
 mpl.use("Agg")
 
 Dashes = Literal["-", "--", "-."]
@@ -58,23 +60,27 @@ SETTINGS = {
 
 
 def in_order(methods: Iterable[str]) -> list[str]:
-    """Return the methods in the order of legends: the paper's five first, then all others by name."""
-    present = set(methods)
-    return [name for name in COLOURS if name in present] + sorted(present - set(COLOURS))
+    """Return the methods in the order of legends: the paper's five, then others by name; compared results last."""
+    ranks = {name: rank for rank, name in enumerate(COLOURS)}
+    return sorted(set(methods), key=lambda name: (is_compared(name), ranks.get(method_of(name), len(ranks)), name))
 
 
 def line_styles(methods: Iterable[str]) -> dict[str, tuple[str, Dashes]]:
-    """Return (colour, dashes) for each method; those of the paper's five never depend on what else is drawn."""
+    """Return (colour, dashes) for each method; those of the paper's five never depend on what else is drawn.
+
+    Compared results have their method's colour and are dashed.
+    """
     styles: dict[str, tuple[str, Dashes]] = {}
     others = 0
-    for name in in_order(methods):
+    present = set(methods)
+    for name in in_order(method_of(name) for name in present):
         if name in COLOURS:
             styles[name] = (COLOURS[name], DASHES[0])
         else:
             turn, index = divmod(others, len(OTHER_COLOURS))
             styles[name] = (OTHER_COLOURS[index], DASHES[turn % len(DASHES)])
             others += 1
-    return styles
+    return {name: (styles[method_of(name)][0], "--") if is_compared(name) else styles[name] for name in present}
 
 
 @contextmanager

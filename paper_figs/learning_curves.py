@@ -14,6 +14,8 @@ from codesign_bench.stats import MIN_SEEDS, curve_statistics
 from ._curves import QUANTITIES, default_rows, draw_curves, method_labels
 
 TITLE = "Learning curves"
+COMPARES = True
+"""Whether `plot --compare` adds the curves of other results."""
 
 INTERVAL = (
     f"line: mean over seeds; dotted: not all seeds got this far\nband: ± standard error, if {MIN_SEEDS} seeds or more"

@@ -14,6 +14,8 @@ from codesign_bench.stats import CONFIDENCE, MIN_SEEDS, curve_intervals
 from ._curves import QUANTITIES, default_rows, draw_curves, method_labels
 
 TITLE = "Learning curves, interquartile mean"
+COMPARES = True
+"""Whether `plot --compare` adds the curves of other results."""
 
 INTERVAL = (
     "line: interquartile mean over seeds; dotted: not all seeds got this far\n"

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, MaxNLocator
 
+from codesign_bench.comparison import is_compared
 from codesign_bench.errors import UserError
 
 from ._order import task_order
@@ -66,7 +67,7 @@ def draw_curves(table: pd.DataFrame, labels: dict[str, str], note: str) -> Figur
             axes[top, column].set_title(str(task).replace("_", " "))
         for axis in axes.flat:
             axis.set_visible(axis.has_data())
-        _add_legend(figure, table, labels, note, columns=2 if columns == 1 else 3)
+        _add_legend(figure, table, labels, note, columns=_legend_columns(table, narrow=columns == 1))
         figure.draw_without_rendering()  # ticks take their settings when first drawn, which must be before leaving
     return figure
 
@@ -128,6 +129,11 @@ def _add_legend(figure: Figure, table: pd.DataFrame, labels: dict[str, str], not
         label = f"{labels.get(method, method)} (n={_seed_count(table[table['method'] == method])})"
         handles.append(Line2D([], [], color=colour, linestyle=dashes, label=label))
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, title=note, title_fontsize=5.5)
+
+
+def _legend_columns(table: pd.DataFrame, *, narrow: bool) -> int:
+    """Return how many entries of the legend stand side by side: compared results have long names."""
+    return (2 if narrow else 3) - any(is_compared(name) for name in table["method"].unique())
 
 
 def _seed_count(rows: pd.DataFrame) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
@@ -73,6 +74,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_reproduce(_add(commands, "reproduce", "run what figures of the paper need, then draw them", _reproduce))
     _add_render(_add(commands, "render", "draw what a policy does, as an animation or a picture", _render))
     _add_deploy(_add(commands, "deploy", "try a policy and its tools on a simulated robot arm", _deploy))
+    _add_export(_add(commands, "export", "write a policy's tools as solids to print", _export))
     _add_bench(_add(commands, "bench", "measure speed on this machine", _bench))
     return parser
 
@@ -228,6 +230,19 @@ def _add_deploy(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, default=DEFAULT_RESULTS, metavar="DIR", help=f"default: {DEFAULT_RESULTS}")
 
 
+def _add_export(parser: argparse.ArgumentParser) -> None:
+    # So that values that start with a minus sign, as in `--start -0.2,0.7`, are no options.
+    parser._negative_number_matcher = re.compile(r"^-\.?\d")
+    parser.add_argument("--policy", type=Path, required=True, metavar="CELL", help="a finished cell's folder")
+    parser.add_argument("--task", metavar="T", help="default: the task of --policy")
+    which = parser.add_mutually_exclusive_group(required=True)
+    which.add_argument("--start", metavar="X,Y", help="the tool for an object that starts there, m")
+    which.add_argument("--goal", metavar="G,...", help="the tool for this goal, in the task's units")
+    which.add_argument("--instances", metavar="N,...", help="tools for these evaluation instances, or all")
+    parser.add_argument("--scale", type=float, default=1.0, metavar="S", help="size of the print; default: 1")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR")
+
+
 def _add_bench(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(required=True, metavar="tasks|learner", dest="what")
     tasks = kinds.add_parser("tasks", help="environment steps beside the raw engine", allow_abbrev=False)
@@ -365,9 +380,8 @@ def _verify(options: argparse.Namespace, console: Console) -> int:
 
 
 def _render(options: argparse.Namespace, console: Console) -> int:
-    from codesign_bench.policy_files import load_policy
+    from codesign_bench.policy_files import policy_and_task
     from codesign_bench.rendering import RandomBehaviour, render
-    from codesign_bench.results import read_cell
     from codesign_bench.seeding import generator
     from codesign_bench.task import load_task
 
@@ -378,11 +392,8 @@ def _render(options: argparse.Namespace, console: Console) -> int:
     if options.episodes < 1:
         raise UserError(f"--episodes must be at least 1, not {options.episodes}")
     if options.policy is not None:
-        policy = load_policy(options.policy)
-        trained_on = (read_cell(options.policy) or {})["task"]
-        if options.task not in (None, trained_on):
-            raise UserError(f"--policy {options.policy}: trained on '{trained_on}', not on '{options.task}'")
-        line = render(load_task(trained_on), policy, options.out, options.episodes)
+        policy, task = policy_and_task(options.policy, options.task)
+        line = render(task, policy, options.out, options.episodes)
     else:
         task = load_task(options.task)
         random = options.behaviour == "random"
@@ -396,7 +407,8 @@ def _deploy(options: argparse.Namespace, console: Console) -> int:
     from dataclasses import replace
 
     from codesign_bench.deployment.conditions import TRIAL, Conditions
-    from codesign_bench.deployment.deploy import Order, deploy, policy_and_task
+    from codesign_bench.deployment.deploy import Order, deploy
+    from codesign_bench.policy_files import policy_and_task
 
     if options.protocol and (options.tool or options.trials is not None):
         raise UserError("deploy: --protocol sets tools and trials itself; leave out --tool and --trials")
@@ -414,6 +426,16 @@ def _deploy(options: argparse.Namespace, console: Console) -> int:
     )
     policy, task = policy_and_task(options.policy, options.task)
     deploy(task, policy, order, options.out, _printer(console), str(options.policy))
+    return 0
+
+
+def _export(options: argparse.Namespace, console: Console) -> int:
+    from codesign_bench.fabrication.export import Order, export
+    from codesign_bench.policy_files import policy_and_task
+
+    policy, task = policy_and_task(options.policy, options.task)
+    order = Order.of(task, start=options.start, goal=options.goal, instances=options.instances, scale=options.scale)
+    export(task, policy, order, options.out, _printer(console), str(options.policy))
     return 0
 
 

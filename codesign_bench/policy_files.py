@@ -10,7 +10,7 @@ from codesign_bench.config import METHOD, method_config
 from codesign_bench.errors import UserError
 from codesign_bench.method import Array, Policy, load_method
 from codesign_bench.results import CELL_FILE, DONE, POLICY_FILE, read_cell
-from codesign_bench.task import load_task
+from codesign_bench.task import Task, load_task
 
 
 def save_policy(folder: Path, policy: Policy, header: dict[str, Any]) -> None:
@@ -35,6 +35,19 @@ def load_policy(folder: str | Path) -> Policy:
         return method_class.make_policy(load_task(cell["task"]), config, tensors)
     except (KeyError, ValueError, RuntimeError) as error:
         raise UserError(f"{path} does not fit method '{cell['method']}' of this version: {error}") from error
+
+
+def policy_and_task(folder: Path, name: str | None) -> tuple[Policy, Task]:
+    """Return the final policy of the cell in `folder` and its task.
+
+    Raises:
+        UserError: it is no finished cell, or was trained on another task than `name`.
+    """
+    policy = load_policy(folder)
+    trained_on = (read_cell(folder) or {})["task"]
+    if name not in (None, trained_on):
+        raise UserError(f"--policy {folder}: trained on '{trained_on}', not on '{name}'")
+    return policy, load_task(trained_on)
 
 
 def policy_tensors(folder: Path) -> dict[str, Array]:

@@ -242,6 +242,14 @@ class Simulator(ABC):
         """
         raise NotImplementedError
 
+    def tool_shapes(self, slot: int) -> tuple[ToolPart, ...]:
+        """Return what the engine itself lets collide as the tool in `slot`, in the frame of the held point.
+
+        Raises:
+            NotImplementedError: the task does not tell.
+        """
+        raise NotImplementedError
+
     def render(self, slot: int) -> Frame:
         """Return a picture of the scene in `slot`, (height, width, 3), in RGB; needs no display and changes nothing.
 
@@ -334,6 +342,14 @@ class Task(ABC):
             UserError: the task does not tell.
         """
         raise UserError(f"task '{self.name}' does not tell what its tools are made of")
+
+    def gripper_handle(self) -> tuple[ToolPart, ...]:
+        """Return what a robot's gripper holds a printed tool by, beyond `tool_parts`, in the frame of the held point.
+
+        The first part touches the tool's node 0, every other one the part before it. None by default: the task has no
+        gripper, or the tool has a handle of its own.
+        """
+        return ()
 
     def script(self) -> Behaviour:
         """Return a designer and a controller written by hand, for pictures and checks: functions of the observation.

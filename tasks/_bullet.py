@@ -312,6 +312,17 @@ class BulletSimulator(DeployedSimulator):
             contained=bool(((states[:, :3] >= low) & (states[:, :3] <= high)).all()),
         )
 
+    def tool_shapes(self, slot: int) -> tuple[BoxPart, ...]:
+        """Return the boxes of the tool's link, a gripper's handle included."""
+        held, world = self._held(slot), self.worlds[slot]
+        # PyBullet tells places from the centre of mass, and that from the link's own frame.
+        centre = np.array(pybullet.getDynamicsInfo(held.body, held.tool_link, physicsClientId=world)[3])
+        shapes = pybullet.getCollisionShapeData(held.body, held.tool_link, physicsClientId=world)
+        return tuple(
+            BoxPart(tuple(0.5 * side for side in shape[3]), tuple((centre + shape[5]).tolist()), shape[6])
+            for shape in shapes
+        )
+
     def render(self, slot: int) -> Frame:
         """Return a picture by PyBullet's own software renderer, with what the task adds in `mark`."""
         camera, (height, width) = self.camera, PICTURE_SHAPE

@@ -1,9 +1,10 @@
-"""What tasks that can be deployed share: the arm by its name."""
+"""What tasks that can be deployed share: the arm by its name, and what its gripper holds."""
 
 from __future__ import annotations
 
 from codesign_bench.deployment.robot import ARMS, IDEAL
 from codesign_bench.errors import unknown_name
+from codesign_bench.task import ToolPart
 
 from ._carriers import Carrier
 from ._scene import Clock
@@ -22,3 +23,10 @@ def arm_carrier(arm: str, base: tuple[float, float, float], clock: Clock) -> Car
     from ._panda import PandaArm  # here, since pybullet_data is needed by no training
 
     return PandaArm(base, clock)
+
+
+def gripper_handle() -> tuple[ToolPart, ...]:
+    """Return what the arm's fingers hold a tool by, from the held point outwards, in its frame."""
+    from ._panda import HANDLE
+
+    return HANDLE

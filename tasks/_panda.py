@@ -14,10 +14,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pybullet_data
 
-from codesign_bench.task import Floats
+from codesign_bench.task import BoxPart, Floats
 
 from . import _panda_kinematics as kinematics
-from ._carriers import Carrier, HeldTool, ToolShape, pybullet
+from ._carriers import LEVEL, Carrier, HeldTool, ToolShape, pybullet
 from ._scene import Clock
 
 MODEL = Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"
@@ -39,6 +39,15 @@ POST_HALF_WIDTH = 0.01
 """m (ours)."""
 FOOT_HALF_HEIGHT = 0.005
 """Of the bar between post and held point, m (ours): as thin as the thinnest tool."""
+HANDLE = (
+    BoxPart((FOOT_HALF_HEIGHT, 0.5 * GRIP_BACK, FOOT_HALF_HEIGHT), (0.0, -0.5 * GRIP_BACK, 0.0), LEVEL),
+    BoxPart(
+        (POST_HALF_WIDTH, POST_HALF_WIDTH, 0.5 * (GRIP_UP + POST_HALF_WIDTH + FOOT_HALF_HEIGHT)),
+        (0.0, -GRIP_BACK, 0.5 * (GRIP_UP + POST_HALF_WIDTH - FOOT_HALF_HEIGHT)),
+        LEVEL,
+    ),
+)
+"""The bar behind the held point and the post on it that the fingers hold (ours)."""
 TOOL_LINK = "tool"
 FOREARM_LINK = 3
 """Links further on are the wrist's and the hand's, rigid or too close together to run into each other."""
@@ -260,9 +269,9 @@ def _close(joint: ElementTree.Element) -> None:
 
 def _tool_link(tool: ToolShape) -> ElementTree.Element:
     """Return the link of the tool, whose frame is that of the held point, with the post."""
-    half_extents = [*tool.half_extents, *(half for half, _ in _POST)]
-    centres = [*tool.centres, *(centre for _, centre in _POST)]
-    rotations = [*tool.rotations, *((0.0, 0.0, 0.0, 1.0) for _ in _POST)]
+    half_extents = [*tool.half_extents, *(part.half_extents for part in HANDLE)]
+    centres = [*tool.centres, *(part.centre for part in HANDLE)]
+    rotations = [*tool.rotations, *(part.rotation for part in HANDLE)]
     volumes = np.prod(half_extents, axis=1)
     link = ElementTree.Element("link", name=TOOL_LINK)
     inertial = ElementTree.SubElement(link, "inertial")
@@ -290,16 +299,6 @@ def _tool_joint() -> ElementTree.Element:
     ElementTree.SubElement(joint, "child", link=TOOL_LINK)
     ElementTree.SubElement(joint, "origin", xyz=_numbers(held[:3, 3]), rpy=_numbers((roll, pitch, yaw)))
     return joint
-
-
-_POST = (
-    (
-        (POST_HALF_WIDTH, POST_HALF_WIDTH, 0.5 * (GRIP_UP + POST_HALF_WIDTH + FOOT_HALF_HEIGHT)),
-        (0.0, -GRIP_BACK, 0.5 * (GRIP_UP + POST_HALF_WIDTH - FOOT_HALF_HEIGHT)),
-    ),
-    ((FOOT_HALF_HEIGHT, 0.5 * GRIP_BACK, FOOT_HALF_HEIGHT), (0.0, -0.5 * GRIP_BACK, 0.0)),
-)
-"""Half extents and centre of the post and of the bar that leads to it, in the frame of the held point, m (ours)."""
 
 
 def _numbers(values: Iterable[float]) -> str:

@@ -136,6 +136,16 @@ class PlanarSimulator(Simulator):
             contained=inside,
         )
 
+    def tool_shapes(self, slot: int) -> tuple[PlanarPart, ...]:
+        """Return the segments of the body that moves: nothing else that moves has any."""
+        return tuple(
+            PlanarPart((shape.a.x, shape.a.y), (shape.b.x, shape.b.y), shape.radius)
+            for shape in self.spaces[slot].shapes
+            if isinstance(shape, pymunk.Segment)
+            and shape.body is not None
+            and shape.body.body_type != pymunk.Body.STATIC
+        )
+
     def render(self, slot: int) -> Frame:
         """Return a picture of every shape in the space, and of what the task adds in `mark`."""
         canvas = Canvas(self.view)

@@ -26,7 +26,7 @@ from codesign_bench.task import (
 
 from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, box_parts, rotations_about
 from ._carriers import Carrier
-from ._deployed import arm_carrier
+from ._deployed import arm_carrier, gripper_handle
 from ._scene import COLOURS, Clock
 
 TABLE = BOX_SCENES["fetch_cube"]
@@ -229,6 +229,10 @@ class FetchCube(Task):
     def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
         """Return the links of the tool of a design (D,) in its units."""
         return box_parts(chain_boxes(design[None])[1])
+
+    def gripper_handle(self) -> tuple[ToolPart, ...]:
+        """Return the bar and the post that the arm's fingers hold."""
+        return gripper_handle()
 
     def script(self) -> Behaviour:
         """Return a script that pulls the cube with whichever side of a link it can bring behind it."""

@@ -29,7 +29,7 @@ from codesign_bench.task import (
 
 from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, box_parts, rotation_matrices, rotations_about
 from ._carriers import Carrier
-from ._deployed import arm_carrier
+from ._deployed import arm_carrier, gripper_handle
 from ._scene import COLOURS, Clock
 
 TABLE = BOX_SCENES["lift_cup"]
@@ -216,6 +216,10 @@ class LiftCup(Task):
     def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
         """Return the handle, cross bar and prongs of the tool of a design (D,) in its units."""
         return box_parts(fork_boxes(design[None]))
+
+    def gripper_handle(self) -> tuple[ToolPart, ...]:
+        """Return the bar and the post that the arm's fingers hold."""
+        return gripper_handle()
 
     def script(self) -> Behaviour:
         """Return a script that puts the prongs beside the cup and lifts."""

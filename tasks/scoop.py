@@ -249,8 +249,9 @@ class Scoop(Task):
         return speed
 
     def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
-        """Return the links of the tool of a design (D,) in its units."""
-        return chain_parts(chain_points(design[None], FIRST_LINK_ANGLE)[0], LINK_HALF_WIDTH)
+        """Return the links of the tool of a design (D,) in its units; it is held, and turned, at the first joint."""
+        points = chain_points(design[None], FIRST_LINK_ANGLE)[0]
+        return chain_parts(points - points[1], LINK_HALF_WIDTH)
 
     def script(self) -> Behaviour:
         """Return a script that lifts whatever tool it is given straight up, and designs a ladle for every number."""

@@ -15,7 +15,7 @@ from PIL import Image
 from codesign_bench import load_task
 from codesign_bench.cli import main
 from codesign_bench.deployment.conditions import TRIAL, Conditions, Physics
-from codesign_bench.deployment.deploy import Order, deploy, policy_and_task
+from codesign_bench.deployment.deploy import Order, deploy
 from codesign_bench.deployment.protocol import grid_trials, own_trials
 from codesign_bench.deployment.robot import IDEAL, PANDA
 from codesign_bench.deployment.rollout import Deployment
@@ -24,6 +24,7 @@ from codesign_bench.episodes import Episodes
 from codesign_bench.errors import UserError
 from codesign_bench.evaluate import evaluate
 from codesign_bench.paper_tables import REAL_ROBOT
+from codesign_bench.policy_files import policy_and_task
 from codesign_bench.seeding import generator
 from codesign_bench.task import Behaviour, Floats, Singles
 

@@ -24,10 +24,9 @@ from codesign_bench.deployment.tables import (
 from codesign_bench.errors import UserError
 from codesign_bench.files import write_bytes, write_json
 from codesign_bench.paper_tables import REAL_ROBOT
-from codesign_bench.policy_files import load_policy
-from codesign_bench.results import open_folder, read_cell, write_rows
+from codesign_bench.results import open_folder, write_rows
 from codesign_bench.seeding import generator
-from codesign_bench.task import Behaviour, Task, load_task
+from codesign_bench.task import Behaviour, Task
 
 
 @dataclass(frozen=True)
@@ -44,19 +43,6 @@ class Order:
     seed: int = 0
     gifs: bool = True
     """Whether to draw every trial."""
-
-
-def policy_and_task(cell: Path, name: str | None) -> tuple[Behaviour, Task]:
-    """Return the final policy of a cell and its task.
-
-    Raises:
-        UserError: it is no finished cell, or was trained on another task than `name`.
-    """
-    policy = load_policy(cell)
-    trained_on = (read_cell(cell) or {})["task"]
-    if name not in (None, trained_on):
-        raise UserError(f"--policy {cell}: trained on '{trained_on}', not on '{name}'")
-    return policy, load_task(trained_on)
 
 
 def deploy(

@@ -1,0 +1,211 @@
+"""`codesign-bench export`: write the tools that a policy designs as solids to print, each with a sheet.
+
+Shapes: `I` instance, `D` design, `T` tools, `N` instances.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from codesign_bench import __version__
+from codesign_bench.episodes import Episodes, portions
+from codesign_bench.errors import UserError
+from codesign_bench.fabrication.picture import picture
+from codesign_bench.fabrication.printability import Print, judge
+from codesign_bench.fabrication.solids import MILLIMETRES, scaled, thickness, tool_solid
+from codesign_bench.files import write_bytes, write_json
+from codesign_bench.results import write_rows
+from codesign_bench.task import Behaviour, Box, Floats, Task
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+ALL = "all"
+SOLID_FORMATS = ("stl", "obj")
+SHEET_FORMAT, PICTURE_FORMAT = "json", "png"
+TABLE_FILE = "tools.csv"
+
+
+@dataclass(frozen=True)
+class Order:
+    """Whose tools to write."""
+
+    labels: tuple[str, ...]
+    """A name for each instance."""
+    instances: Floats
+    """(N, I) in the instance space's units."""
+    scale: float = 1.0
+    """Size of the prints over that of the tools."""
+
+    @classmethod
+    def of(
+        cls,
+        task: Task,
+        start: str | None = None,
+        goal: str | None = None,
+        instances: str | None = None,
+        scale: float = 1.0,
+    ) -> Order:
+        """Return the order that exactly one of `start`, `goal` and `instances` means, as the command line has them.
+
+        What a start or a goal leaves open of an instance is taken from the first evaluation instance.
+
+        Raises:
+            UserError: a value means nothing for the task.
+        """
+        if not (math.isfinite(scale) and scale > 0.0):
+            raise UserError(f"--scale must be positive, not {scale}")
+        fixed = task.evaluation_instances()
+        if instances is not None:
+            chosen = _numbers_of_instances(instances, len(fixed))
+            return cls(tuple(f"instance-{number:03d}" for number in chosen), fixed[chosen], scale)
+        names = task.goal_space.names
+        option, text = ("--start", start) if start is not None else ("--goal", goal or "")
+        if start is not None and not all("start" in name for name in names):
+            raise UserError(f"--start: no object of task '{task.name}' has one; give --goal {','.join(names)}")
+        values = _values(option, text, task.goal_space)
+        return cls(
+            (f"{option.lstrip('-')}-{'_'.join(f'{value:g}' for value in values)}",),
+            np.concatenate([values, fixed[0, task.goal_size :]])[None],
+            scale,
+        )
+
+
+def export(
+    task: Task, policy: Behaviour, order: Order, out: Path, say: Callable[[str], None], source: str = ""
+) -> list[Print]:
+    """Write the tools that `policy` designs for the instances of `order` into `out`; return what printing them takes.
+
+    Every tool gets STL, OBJ, a JSON sheet and a picture; tools that are the same for several instances are written
+    once. A table has one row per tool.
+
+    Args:
+        task: the policy's.
+        policy: designs the tools.
+        order: for which instances, and how large.
+        out: a folder, made if it is not there.
+        say: tells the user a line.
+        source: where the policy comes from, for the sheets.
+
+    Raises:
+        UserError: a file is there already, `out` cannot be written, or the extra `export` is not installed.
+    """
+    designs, owners = np.unique(_designs(task, policy, order.instances), axis=0, return_inverse=True)
+    first = [int(np.flatnonzero(owners == tool)[0]) for tool in range(len(designs))]
+    stems = [f"{task.name}-{order.labels[index]}" for index in first]
+    _open(out, [f"{stem}.{ending}" for stem in stems for ending in (*SOLID_FORMATS, SHEET_FORMAT, PICTURE_FORMAT)])
+    prints, rows = [], []
+    for tool in np.argsort(first).tolist():
+        stem, design = stems[tool], designs[tool]
+        solid = tool_solid(task, design, order.scale)
+        walls = [thickness(scaled(part, order.scale)) for part in (*task.tool_parts(design), *task.gripper_handle())]
+        result = judge(solid.mesh, MILLIMETRES * min(walls))
+        for kind in SOLID_FORMATS:
+            write_bytes(out / f"{stem}.{kind}", file_content(solid.mesh, kind))
+        write_bytes(out / f"{stem}.{PICTURE_FORMAT}", picture(solid.mesh, stem))
+        served = np.flatnonzero(owners == tool).tolist()
+        write_json(
+            out / f"{stem}.{SHEET_FORMAT}",
+            {
+                "version": __version__,
+                "task": task.name,
+                "policy": source,
+                "scale": order.scale,
+                "instances": {order.labels[n]: _named(task.instance_space, order.instances[n]) for n in served},
+                "design": _named(task.design_space, design),
+                "units": dict(zip(task.design_space.names, task.design_space.units, strict=True)),
+                "printable": result.printable,
+                **asdict(result),
+                "fillet_volume_mm3": solid.fillet_volume,
+                "handle": "the gripper's, added" if task.gripper_handle() else "the tool's own first link",
+            },
+        )
+        prints.append(result)
+        rows.append(_row(stem, order, served, result))
+        say(_line(stem, result))
+    write_rows(out / TABLE_FILE, rows)
+    say(f"{sum(result.printable for result in prints)} of {len(prints)} tools can be printed in one piece: {out}")
+    return prints
+
+
+def file_content(mesh: Trimesh, kind: str) -> bytes:
+    """Return `mesh` in one of `SOLID_FORMATS`."""
+    content = mesh.export(file_type=kind)
+    return content if isinstance(content, bytes) else str(content).encode()
+
+
+def _designs(task: Task, policy: Behaviour, instances: Floats) -> Floats:
+    """Return the tools (N, D), in the design space's units, that `policy` designs for `instances` (N, I)."""
+    parts = []
+    for part in portions(len(instances), task):
+        some = instances[part]
+        episodes = Episodes(task, len(some))
+        episodes.begin(np.arange(len(some)), some)
+        parts.append(task.design_space.from_unit(policy.design(episodes.observation)))
+    return np.concatenate(parts)
+
+
+def _open(out: Path, files: Iterable[str]) -> None:
+    """Make the folder `out`; refuse when one of `files` is there."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"--out {out}: cannot write there ({error.strerror})") from error
+    for name in (TABLE_FILE, *files):
+        if (out / name).exists():
+            raise UserError(f"--out {out}: {name} is there already; choose another folder")
+
+
+def _numbers_of_instances(text: str, count: int) -> list[int]:
+    if text == ALL:
+        return list(range(count))
+    try:
+        chosen = list(dict.fromkeys(int(word) for word in text.split(",")))
+    except ValueError:
+        chosen = [-1]
+    if any(not 0 <= number < count for number in chosen):
+        raise UserError(f"--instances {text}: name evaluation instances from 0 to {count - 1}, or {ALL}")
+    return chosen
+
+
+def _values(option: str, text: str, space: Box) -> Floats:
+    try:
+        values = np.array([float(word) for word in text.split(",")])
+    except ValueError:
+        values = np.array([np.nan])
+    if len(values) != space.size or not np.isfinite(values).all():
+        entries = ", ".join(
+            f"{name} ({low:g} to {high:g} {unit})"
+            for name, low, high, unit in zip(space.names, space.low, space.high, space.units, strict=True)
+        )
+        raise UserError(f"{option} {text}: give a number for each of {entries}, separated by commas")
+    return values
+
+
+def _named(space: Box, values: Floats) -> dict[str, float]:
+    return dict(zip(space.names, values.tolist(), strict=True))
+
+
+def _row(stem: str, order: Order, served: list[int], result: Print) -> dict[str, Any]:
+    return {
+        "tool": stem,
+        "instances": " ".join(order.labels[number] for number in served),
+        "printable": int(result.printable),
+        "volume_mm3": result.volume_mm3,
+        "mass_kg": result.mass_kg,
+        **{f"side_{axis}_mm": side for axis, side in zip("xyz", result.bounding_box_mm, strict=True)},
+        "thinnest_wall_mm": result.thinnest_wall_mm,
+        "problems": "; ".join(result.problems),
+    }
+
+
+def _line(stem: str, result: Print) -> str:
+    sides = " x ".join(f"{side:.0f}" for side in result.bounding_box_mm)
+    end = f"cannot be printed in one piece: {'; '.join(result.problems)}" if result.problems else "can be printed"
+    return f"{stem}: {sides} mm, {1000.0 * result.mass_kg:.0f} g of solid PLA, {end}"

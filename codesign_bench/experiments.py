@@ -78,7 +78,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     "hyperparameter_tables": Experiment(("hyperparameter_tables",), "appendix, tables of hyperparameters"),
     "design_sensitivity": Experiment(("design_sensitivity",), "ours: the premise of the tasks"),
     "learning_curves": Experiment(
-        ("learning_curves", "learning_curves_iqm"),
+        ("learning_curves", "learning_curves_iqm", "final_results"),
         "section 'Evaluating sample efficiency'",
         ((Grid(ALL_TASKS, (OURS, *BASELINES)),),),
     ),

@@ -177,7 +177,7 @@ def test_claims_with_data_are_told_apart_from_those_that_lack_some() -> None:
 
 def test_figures_lie_in_the_page_with_their_numbers(page: str) -> None:
     pictures = [address for address in Reader(page).addresses if address.startswith("data:image/png;base64,")]
-    assert len(pictures) == 2  # learning curves, as means and as interquartile means
+    assert len(pictures) == 3  # learning curves, as means and as interquartile means, and final results
     assert base64.b64decode(pictures[0].partition(",")[2]).startswith(b"\x89PNG")
     numbers, _ = (address for address in Reader(page).addresses if address.startswith("data:text/csv;base64,"))
     table = base64.b64decode(numbers.partition(",")[2]).decode()

@@ -1,0 +1,136 @@
+"""Final return and success of every method on every task, with intervals over seeds: the benchmark's table (ours).
+
+Numbers are means over seeds, of the last evaluation of each; seeds that stopped early are left out. Minutes are what
+a cell took as it ran, beside others.
+"""
+
+from __future__ import annotations
+
+import math
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from codesign_bench.seeding import generator
+from codesign_bench.stats import CONFIDENCE, MIN_SEEDS, final_values, mean_interval
+from codesign_bench.text_tables import latex, markdown
+
+from ._curves import PANELS_PER_ROW, QUANTITIES, default_rows, method_labels
+from ._order import task_order
+from ._style import PAGE_WIDTH, in_order, line_styles, style
+
+TITLE = "Final results"
+ROW_HEIGHT = 0.17
+"""Of a method in a panel, in inches."""
+INTERVAL = (
+    f"dot: mean over seeds (n); bar: {CONFIDENCE:.0%} bootstrap interval of the mean, if {MIN_SEEDS} seeds or more"
+)
+"""The kind of interval, written on the figure."""
+DIGITS = 2
+FARTHEST_SHARE = 0.9
+"""A seed counts if it got at least this share of the steps of its method's farthest (ours)."""
+
+
+def data(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return one row per task and method, the same in every call.
+
+    Args:
+        frame: rows as `codesign_bench.load_results` gives them; variants other than `default` are left out.
+
+    Returns:
+        Columns task, method, label, seeds, env_steps (mean over seeds), then for each quantity ("return_mean",
+        "success_rate") itself, `<quantity>_low` and `<quantity>_high` (NaN for fewer than three seeds), and minutes.
+
+    Raises:
+        UserError: a column, or every row of the default variant, is missing.
+    """
+    rows, rng = default_rows(frame, "final_results"), generator(0, "final_results")
+    labels = method_labels(frame)
+    finals = {name: final_values(rows, name) for name in (*QUANTITIES, "wall_s")}
+    result = []
+    for task in task_order(rows["task"]):
+        for method in in_order(rows.loc[rows["task"] == task, "method"]):
+            own = {name: _ended(table, task, method) for name, table in finals.items()}
+            row: dict[str, object] = {
+                "task": task,
+                "method": method,
+                "label": labels.get(method, method),
+                "seeds": len(own["wall_s"]),
+                "env_steps": float(own["wall_s"]["env_steps"].mean()),
+            }
+            for name in QUANTITIES:
+                values = own[name][name].to_numpy()
+                low, high = mean_interval(values, rng)
+                row |= {name: float(values.mean()), f"{name}_low": low, f"{name}_high": high}
+            result.append({**row, "minutes": float(own["wall_s"]["wall_s"].mean()) / 60.0})
+    return pd.DataFrame(result)
+
+
+def draw(frame: pd.DataFrame) -> Figure:
+    """Return the figure: one panel of success rates for each task, one line for each method.
+
+    Raises:
+        UserError: as `data` does.
+    """
+    table = data(frame)
+    tasks = task_order(table["task"])
+    columns = min(len(tasks), PANELS_PER_ROW)
+    rows = math.ceil(len(tasks) / columns)
+    most = int(table.groupby("task").size().max())
+    with style():
+        figure = Figure(figsize=(PAGE_WIDTH, rows * (ROW_HEIGHT * most + 0.5) + 0.3), layout="constrained")
+        axes = figure.subplots(rows, columns, squeeze=False)
+        for axis, task in zip(axes.flat, tasks, strict=False):
+            _draw_panel(axis, table[table["task"] == task], str(task).replace("_", " "))
+        for axis in axes.flat[len(tasks) :]:
+            axis.set_visible(False)
+        figure.supxlabel(INTERVAL, fontsize=6)
+        figure.draw_without_rendering()
+    return figure
+
+
+def texts(frame: pd.DataFrame) -> dict[str, str]:
+    """Return the table as text by file ending: Markdown and LaTeX.
+
+    Raises:
+        UserError: as `data` does.
+    """
+    header = ["task", "method", "seeds", "steps", "return", "success", "minutes a cell"]
+    rows = [
+        [
+            str(row["task"]).replace("_", " "),
+            str(row["label"]),
+            str(row["seeds"]),
+            f"{row['env_steps']:,.0f}",
+            *(_with_interval(row, name) for name in QUANTITIES),
+            f"{row['minutes']:.1f}",
+        ]
+        for row in data(frame).to_dict("records")
+    ]
+    return {"md": markdown(header, rows), "tex": latex(header, rows)}
+
+
+def _ended(table: pd.DataFrame, task: str, method: str) -> pd.DataFrame:
+    """Return the rows of the seeds that came to the end of their budget."""
+    own = table[(table["task"] == task) & (table["method"] == method)]
+    return own[own["env_steps"] >= FARTHEST_SHARE * own["env_steps"].max()]
+
+
+def _draw_panel(axes: Axes, table: pd.DataFrame, title: str) -> None:
+    styles = line_styles(table["method"])
+    for place, row in enumerate(table.to_dict("records")):
+        colour, _ = styles[str(row["method"])]
+        axes.plot([row["success_rate_low"], row["success_rate_high"]], [place, place], color=colour, linewidth=2.0)
+        axes.plot([row["success_rate"]], [place], "o", color=colour, markersize=4.0, gid=str(row["method"]))
+    axes.set_yticks(range(len(table)), [f"{row['label']} ({row['seeds']})" for row in table.to_dict("records")])
+    axes.set_ylim(len(table) - 0.5, -0.5)
+    axes.set_xlim(-0.03, 1.03)
+    axes.set_xlabel("success rate")
+    axes.set_title(title)
+
+
+def _with_interval(row: dict[object, object], name: str) -> str:
+    centre, low, high = (float(str(row[key])) for key in (name, f"{name}_low", f"{name}_high"))
+    interval = "" if math.isnan(low) else f" [{low:.{DIGITS}f}, {high:.{DIGITS}f}]"
+    return f"{centre:.{DIGITS}f}{interval}"

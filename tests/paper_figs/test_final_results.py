@@ -1,0 +1,81 @@
+"""The table of final values, by numbers that can be checked by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from codesign_bench.errors import UserError
+from codesign_bench.registry import load_module
+
+figure: Any = load_module("paper_figs", "final_results")
+
+
+def cells(method: str, finals: list[float], task: str = "push", variant: str = "default") -> pd.DataFrame:
+    """Return one cell per final return, each with an evaluation before it; half an hour, success a tenth of return."""
+    rows = [
+        {
+            "task": task,
+            "method": method,
+            "variant": variant,
+            "seed": seed,
+            "env_steps": steps,
+            "return_mean": value,
+            "success_rate": value / 10.0,
+            "wall_s": 1800.0 * steps / 1000,
+        }
+        for seed, final in enumerate(finals)
+        for steps, value in ((0, -5.0), (1000, final))
+    ]
+    return pd.DataFrame(rows)
+
+
+def test_the_last_evaluation_counts() -> None:
+    (row,) = figure.data(cells("gnn_ppo", [1.0, 2.0, 6.0])).to_dict("records")
+    assert (row["seeds"], row["env_steps"], row["minutes"]) == (3, 1000.0, 30.0)
+    assert row["return_mean"] == pytest.approx(3.0)
+    assert row["success_rate"] == pytest.approx(0.3)
+    assert 1.0 <= row["return_mean_low"] < 3.0 < row["return_mean_high"] <= 6.0
+
+
+def test_two_seeds_have_no_interval() -> None:
+    frame = cells("gnn_ppo", [1.0, 2.0])
+    (row,) = figure.data(frame).to_dict("records")
+    assert np.isnan(row["return_mean_low"])
+    assert "| push | gnn_ppo | 2 | 1,000 | 1.50 | 0.15 | 30.0 |" in figure.texts(frame)["md"]
+
+
+def test_a_seed_that_stopped_early_does_not_count() -> None:
+    early = cells("gnn_ppo", [9.0] * 4)
+    early = early[(early["seed"] == 3)].assign(env_steps=lambda rows: rows["env_steps"] // 2)
+    (row,) = figure.data(pd.concat([cells("gnn_ppo", [1.0] * 3), early])).to_dict("records")
+    assert (row["seeds"], row["return_mean"]) == (3, 1.0)
+
+
+def test_methods_stand_in_the_papers_order_and_other_variants_are_left_out() -> None:
+    parts = [cells(name, [1.0] * 3) for name in ("cma_es", "gnn_ppo")]
+    table = figure.data(pd.concat([*parts, cells("gnn_ppo", [9.0], variant="alpha-0.30")]))
+    assert table["method"].tolist() == ["gnn_ppo", "cma_es"]
+    assert table["return_mean"].max() == 1.0
+
+
+def test_the_picture_shows_the_table() -> None:
+    frame = pd.concat([cells("gnn_ppo", [6.0] * 3), cells("cma_rl", [2.0] * 3), cells("gnn_ppo", [8.0], task="scoop")])
+    drawn = {axes.get_title(): axes for axes in figure.draw(frame).axes if axes.get_visible()}
+    assert set(drawn) == {"push", "scoop"}
+    places = {line.get_gid(): line.get_xdata()[0] for line in drawn["push"].lines if line.get_marker() == "o"}
+    assert places == pytest.approx({"gnn_ppo": 0.6, "cma_rl": 0.2})
+    assert [text.get_text() for text in drawn["push"].get_yticklabels()] == ["gnn_ppo (3)", "cma_rl (3)"]
+
+
+def test_the_same_results_give_the_same_intervals() -> None:
+    frame = cells("gnn_ppo", [1.0, 2.0, 6.0])
+    pd.testing.assert_frame_equal(figure.data(frame), figure.data(frame))
+
+
+def test_without_curves_the_way_to_them_is_told() -> None:
+    with pytest.raises(UserError, match="final_results: no evaluated cell"):
+        figure.data(cells("gnn_ppo", [1.0], variant="alpha-0.30"))

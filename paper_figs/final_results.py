@@ -111,6 +111,28 @@ def texts(frame: pd.DataFrame) -> dict[str, str]:
     return {"md": markdown(header, rows), "tex": latex(header, rows)}
 
 
+def success_by_task(table: pd.DataFrame) -> str:
+    """Return the success rates of `data` as a Markdown table, tasks in rows and methods in columns."""
+    methods = in_order(table["method"])
+    by_cell = {(row["task"], row["method"]): row for row in table.to_dict("records")}
+    rows = [
+        [
+            str(task).replace("_", " "),
+            _range(table.loc[table["task"] == task, "seeds"]),
+            *(
+                _with_interval(by_cell[task, name], "success_rate") if (task, name) in by_cell else "-"
+                for name in methods
+            ),
+        ]
+        for task in task_order(table["task"])
+    ]
+    return markdown(["task", "seeds", *(f"`{name}`" for name in methods)], rows)
+
+
+def _range(values: pd.Series[int]) -> str:
+    return str(values.min()) if values.min() == values.max() else f"{values.min()}-{values.max()}"
+
+
 def _ended(table: pd.DataFrame, task: str, method: str) -> pd.DataFrame:
     """Return the rows of the seeds that came to the end of their budget."""
     own = table[(table["task"] == task) & (table["method"] == method)]

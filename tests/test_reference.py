@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 import codesign_bench as cb
+from codesign_bench.cli import main
 from codesign_bench.config import differences, resolve
 from codesign_bench.evaluate import evaluate
 from codesign_bench.method import load_method
@@ -19,12 +23,39 @@ METHODS: tuple[str, ...] = import_module("codesign_bench.methods").ORDER
 pytestmark = pytest.mark.skipif(not REFERENCE.exists(), reason="a source distribution leaves the results out")
 
 
-def test_every_method_has_six_finished_seeds_on_push() -> None:
+SEEDS = {"push": 6, "catch_balls": 6, "scoop": 6, "fetch_cube": 6, "lift_cup": 6, "scoop_3d": 3}
+
+
+@pytest.mark.parametrize("task", cb.task_names())
+def test_every_method_has_its_finished_seeds(task: str) -> None:
     frame = cb.load_results(REFERENCE)
-    seeds = frame[frame["task"] == "push"].groupby("method")["seed"].nunique()
-    assert seeds.to_dict() == dict.fromkeys(METHODS, 6)
-    last = frame.groupby(["method", "seed"])["env_steps"].max()
-    assert (last >= 1_000_000).all()
+    own = frame[(frame["task"] == task) & (frame["variant"] == "default")]
+    assert own.groupby("method")["seed"].nunique().to_dict() == dict.fromkeys(METHODS, SEEDS[task])
+    budget = resolve(load_method("gnn_ppo"), task, "laptop", [])["run"]["steps"]["value"]
+    assert (own.groupby(["method", "seed"])["env_steps"].max() >= budget).all()
+
+
+def test_the_pages_say_what_the_results_say() -> None:
+    checked = subprocess.run(
+        [sys.executable, str(REFERENCE.parent / "fill_tables.py"), "--check"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert checked.returncode == 0, f"{checked.stdout}{checked.stderr}; run: python results/fill_tables.py"
+
+
+def test_the_shipped_claims_are_those_of_the_shipped_results(tmp_path: Path) -> None:
+    assert main(["verify", "--results", str(REFERENCE), "--out", str(tmp_path)]) == 0
+    made, shipped = (
+        {row["name"]: row["verdict"] for row in json.loads((folder / "claims.json").read_text())["claims"]}
+        for folder in (tmp_path, REFERENCE / "claims")
+    )
+    assert made == shipped
+
+
+def test_the_folder_stays_small() -> None:
+    assert sum(path.stat().st_size for path in REFERENCE.rglob("*") if path.is_file()) < 60e6
 
 
 FIRST_SEEDS = sorted(path.parent for path in REFERENCE.glob("*/*/default/seed-00/cell.json"))

@@ -12,7 +12,7 @@ from typing import Any
 from rich.console import Console
 
 from codesign_bench import __version__, stats
-from codesign_bench.claims.claim import UNDECIDED, VERDICTS, Claim, Finding, Lacking
+from codesign_bench.claims.claim import CONTRADICTED, UNDECIDED, VERDICTS, Claim, Finding, Lacking
 from codesign_bench.claims.evidence import Evidence, Measure, load_evidence
 from codesign_bench.claims.paper import CLAIMS, OUTSIDE
 from codesign_bench.errors import UserError
@@ -166,6 +166,10 @@ def as_markdown(rows: Sequence[Row], results: Path) -> str:
         "# What the results say of the paper's claims\n",
         f"Results: `{results}`. {summary(rows)}. Intervals are 95 % percentile bootstrap intervals over seeds "
         f"({stats.RESAMPLES:,} resamples); below {stats.MIN_SEEDS} seeds there is none and nothing is decided.\n",
+        by_rule(rows),
+        "## Contradicted\n",
+        contradicted(rows),
+        "## Every claim\n",
         markdown(header, table),
         "## Rules\n",
         markdown(("rule", "statistic", "verdict"), [(kind, *words) for kind, words in rules.items()]),
@@ -173,6 +177,24 @@ def as_markdown(rows: Sequence[Row], results: Path) -> str:
     if missing(rows):
         parts += ["## Data that are missing\n", "```\n" + "\n".join(missing(rows)) + "\n```\n"]
     return "\n".join(parts)
+
+
+def by_rule(rows: Sequence[Row]) -> str:
+    """Return a Markdown table of how many claims came out how, by the rule that judged them."""
+    kinds = dict.fromkeys(row.claim.rule.kind for row in rows)
+    found = Counter((row.claim.rule.kind, row.finding.verdict) for row in rows)
+    table = [(kind, *(str(found[kind, verdict]) for verdict in VERDICTS)) for kind in kinds]
+    return markdown(("rule", *VERDICTS), table)
+
+
+def contradicted(rows: Sequence[Row]) -> str:
+    """Return a Markdown list of the claims that the results contradict, each with what was found."""
+    lines = [
+        f"- {row.claim.sentence}: {row.interval} ({'; '.join(filter(None, (row.finding.n, row.finding.note)))})"
+        for row in rows
+        if row.finding.verdict == CONTRADICTED
+    ]
+    return "\n".join(lines or ["None."]) + "\n"
 
 
 def _number(value: float) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from codesign_bench import cli
-from codesign_bench.claims.claim import SUPPORTED, UNDECIDED, VERDICTS, Claim, Finding, Lacking, Rule
+from codesign_bench.claims.claim import CONTRADICTED, SUPPORTED, UNDECIDED, VERDICTS, Claim, Finding, Lacking, Rule
 from codesign_bench.claims.evidence import Evidence, load_evidence
 from codesign_bench.claims.paper import CLAIMS
 from codesign_bench.claims.verify import as_json, as_markdown, judge, missing, summary
@@ -126,9 +126,16 @@ def test_claims_of_each_verdict_are_counted_and_told() -> None:
     page = as_markdown(rows, Path("here"))
     assert "| sentence of one | *supported* | 1.00 [0.50, 1.50] | 3 seeds | kind | section | so be it |" in page
     assert "nothing there; needs: `make here`" in page
+    assert "| kind | 1 | 0 | 2 |" in page
+    assert "## Contradicted\n\nNone.\n" in page
     one, two, three = as_json(rows, Path("here"))["claims"]
     assert (one["value"], one["low"], one["high"]) == (1.0, 0.5, 1.5)
     assert (two["high"], three["value"], three["needs"]) == ("inf", None, ["make here"])
+
+
+def test_what_is_contradicted_is_listed_with_its_number() -> None:
+    rows = judge([claim("one", Finding(CONTRADICTED, 0.25, 0.2, 0.3, n="3 seeds"))], Evidence(), "here")
+    assert "- sentence of one: 0.25 [0.20, 0.30] (3 seeds)\n" in as_markdown(rows, Path("here"))
 
 
 def test_a_new_claim_moves_no_other_interval() -> None:

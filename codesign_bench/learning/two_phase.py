@@ -38,6 +38,8 @@ from codesign_bench.seeding import Streams
 from codesign_bench.task import Floats, Singles, Slots
 
 CPU = torch.device("cpu")
+BLOCK = 64
+"""Rows of observations come in multiples of this where products are compiled for their shape (ours)."""
 
 ChooseDesigns = Callable[[Slots], Singles]
 """Maps slots (b,) to the designs (b, D) of all their episodes in the batch to come."""
@@ -126,6 +128,15 @@ class TwoPhaseLearner:
         with self._autocast():
             mean, log_std = phase(observation)
         return mean.float(), log_std
+
+    def _full_blocks(self, observation: Tensor) -> Tensor:
+        """Return observations (m, O), in reduced precision with rows of zeros up to a multiple of `BLOCK`.
+
+        The share of design steps differs between minibatches, and the library behind such products compiles and keeps a
+        kernel for every number of rows: hundreds of megabytes.
+        """
+        missing = -len(observation) % BLOCK if self.config.precision == "bf16" else 0
+        return nn.functional.pad(observation, (0, 0, 0, missing)) if missing else observation
 
     def _predict(self, observation: Tensor) -> Tensor:
         """Return the value network's output (m,) as the update computes it."""
@@ -288,7 +299,8 @@ class TwoPhaseLearner:
             ):
                 if where.any():  # Few minibatches of few steps may hold no design step.
                     chosen = index[where]
-                    part, part_entropy = gaussian(*self._distribution(phase, observation[chosen]), action[chosen])
+                    mean, log_std = self._distribution(phase, self._full_blocks(observation[chosen]))
+                    part, part_entropy = gaussian(mean[: len(chosen)], log_std, action[chosen])
                     log_prob = log_prob.masked_scatter(where, part)
                     entropy = entropy + where.float().mean() * part_entropy
             return log_prob, entropy

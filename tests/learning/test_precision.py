@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
-from codesign_bench.learning.two_phase import TwoPhaseLearner
+from codesign_bench.learning.two_phase import BLOCK, TwoPhaseLearner
 from codesign_bench.method import Problem, load_method
 from codesign_bench.seeding import Streams
 from codesign_bench.task import load_task
@@ -38,6 +39,35 @@ def test_both_precisions_learn_nearly_the_same(credit: str) -> None:
     assert 0.0 < apart < 0.5 * moved
     np.testing.assert_allclose(metrics["bf16"]["value_loss"], metrics["fp32"]["value_loss"], rtol=0.2)
     np.testing.assert_allclose(metrics["bf16"]["kl"], metrics["fp32"]["kl"], rtol=0.5, atol=1e-3)
+
+
+@pytest.mark.parametrize(("precision", "whole"), [("fp32", False), ("bf16", True)])
+def test_in_bfloat16_networks_see_few_different_numbers_of_rows(precision: str, whole: bool) -> None:
+    one, rows = learner(precision, "joint"), set[int]()
+    for phase in (one.actor.design, one.actor.control):
+
+        def watched(observation: torch.Tensor, phase: Any = phase) -> Any:
+            rows.add(len(observation))
+            return phase(observation)
+
+        setattr(one.actor, phase.__name__, watched)
+    batch = one.collect(700, 5)
+    rows.clear()
+    one.update(batch)
+    assert all(count % BLOCK == 0 for count in rows) == whole
+    assert len(rows) <= 5 or not whole
+
+
+def test_rows_that_fill_a_block_change_nothing() -> None:
+    filled, bare = learner("bf16", "joint"), learner("bf16", "joint")
+    bare._full_blocks = lambda observation: observation  # type: ignore[method-assign]
+    batch = filled.collect(700, 5)
+    metrics = [one.update(batch) for one in (filled, bare)]
+    assert metrics[0]["kl"] == pytest.approx(metrics[1]["kl"], rel=0.05)
+    assert metrics[0]["policy_steps"] == metrics[1]["policy_steps"]
+    weights = [torch.cat([p.detach().flatten() for p in one.actor.parameters()]) for one in (filled, bare)]
+    start = torch.cat([p.detach().flatten() for p in learner("bf16", "joint").actor.parameters()])
+    assert float((weights[0] - weights[1]).norm()) < 0.05 * float((weights[0] - start).norm())
 
 
 def test_an_unknown_precision_is_refused() -> None:

@@ -32,7 +32,7 @@ def test_every_method_has_its_finished_seeds(task: str) -> None:
     frame = cb.load_results(REFERENCE)
     own = frame[(frame["task"] == task) & (frame["variant"] == "default")]
     assert own.groupby("method")["seed"].nunique().to_dict() == dict.fromkeys(METHODS, SEEDS.get(task, 3))
-    budget = resolve(load_method("gnn_ppo"), task, "laptop", [])["run"]["steps"]["value"]
+    budget = resolve(load_method("gnn_ppo"), task, "laptop", []).run.steps
     assert (own.groupby(["method", "seed"])["env_steps"].max() >= budget).all()
 
 

@@ -5,11 +5,12 @@ Colours are those of Okabe and Ito (2008), which readers with any common colour 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 
 from codesign_bench.comparison import is_compared, method_of
 
@@ -89,3 +90,12 @@ def style() -> Iterator[None]:
     settings: dict[Any, Any] = {**mpl.rcParamsDefault, **SETTINGS, "backend": "Agg"}
     with mpl.rc_context(settings):
         yield
+
+
+def draw_table(axes: Axes, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Fill `axes` with a table of texts, columns as wide as they need to be."""
+    axes.axis("off")
+    table = axes.table(rows, colLabels=header, loc="center", edges="horizontal", cellLoc="right")
+    table.auto_set_font_size(False)
+    table.set_fontsize(6)
+    table.auto_set_column_width(list(range(len(header))))

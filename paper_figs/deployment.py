@@ -16,7 +16,7 @@ from codesign_bench.paper_tables import REAL_ROBOT
 from codesign_bench.text_tables import latex, markdown
 
 from ._order import task_order
-from ._style import PAGE_WIDTH, style
+from ._style import PAGE_WIDTH, draw_table, style
 
 TITLE = "Deployment on a simulated arm"
 SOURCE = "deployment"
@@ -77,11 +77,7 @@ def draw(frame: pd.DataFrame) -> Figure:
         heights = (TABLE_HEIGHT, MAP_HEIGHT) if tools else (TABLE_HEIGHT,)
         top, *below = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
         axes = top.subplots()
-        axes.axis("off")
-        table = axes.table(cells, colLabels=header, loc="center", edges="horizontal", cellLoc="right")
-        table.auto_set_font_size(False)
-        table.set_fontsize(6)
-        table.auto_set_column_width(list(range(len(header))))
+        draw_table(axes, header, cells)
         axes.set_title(NOTE, fontsize=7)
         if tools:
             (bottom,) = below

@@ -14,7 +14,7 @@ from codesign_bench.paper_tables import PROTOCOL, TIMINGS
 from codesign_bench.text_tables import latex, markdown
 
 from ._order import task_order
-from ._style import PAGE_WIDTH, in_order, style
+from ._style import PAGE_WIDTH, draw_table, in_order, style
 
 TITLE = "Training and inference time"
 SOURCE = "timing"
@@ -54,11 +54,7 @@ def draw(frame: pd.DataFrame) -> Figure:
     with style():
         figure = Figure(figsize=(PAGE_WIDTH, ROW_HEIGHT * (len(rows) + 3)), layout="constrained")
         axes = figure.subplots()
-        axes.axis("off")
-        table = axes.table(rows, colLabels=header, loc="center", edges="horizontal", cellLoc="right")
-        table.auto_set_font_size(False)
-        table.set_fontsize(6)
-        table.auto_set_column_width(list(range(len(header))))
+        draw_table(axes, header, rows)
         axes.set_title(TITLE)
         figure.draw_without_rendering()
     return figure

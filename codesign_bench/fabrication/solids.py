@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -134,7 +135,7 @@ def _is_one_solid(mesh: Trimesh) -> bool:
     return bool(mesh.is_volume and mesh.body_count == 1)
 
 
-def _trimesh():  # type: ignore[no-untyped-def]  # a module
+def _trimesh() -> ModuleType:
     try:
         import manifold3d  # noqa: F401  # trimesh finds its boolean engine by itself
         import trimesh

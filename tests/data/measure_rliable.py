@@ -2,8 +2,8 @@
 
 rliable 1.2.0 does not import beside pandas 3, so it runs in an environment of its own:
 
-    python3.11 -m venv /tmp/rliable && /tmp/rliable/bin/pip install "rliable==1.2.0" "pandas<3" "numpy<2.3"
-    /tmp/rliable/bin/python tests/data/measure_rliable.py tests/data/rliable.json
+    python3.11 -m venv rliable-venv && rliable-venv/bin/pip install "rliable==1.2.0" "pandas<3" "numpy<2.3"
+    rliable-venv/bin/python tests/data/measure_rliable.py tests/data/rliable.json
 
 Scores have the shape (runs, tasks), as rliable wants them.
 """

@@ -12,6 +12,7 @@ from codesign_bench.config import ResolvedConfig, check_overrides, resolve
 from codesign_bench.episodes import Tradeoff
 from codesign_bench.errors import UserError
 from codesign_bench.method import Problem, load_method
+from codesign_bench.results import DEFAULT_VARIANT
 from codesign_bench.task import load_task
 
 
@@ -41,7 +42,7 @@ class Cell:
         """The name of the variant, e.g. `default`, `cutout-0.40`, `cutout-0.40_alpha-0.30`, `finetune-1`."""
         parts = [f"{name}-{_two_digits(value)}" for name, value in self._shares if value is not None]
         parts += [f"{name}-{number}" for name, number in self._numbers if number is not None]
-        return "_".join(parts) or "default"
+        return "_".join(parts) or DEFAULT_VARIANT
 
     @property
     def _shares(self) -> tuple[tuple[str, float | None], ...]:

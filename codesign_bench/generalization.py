@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from codesign_bench.errors import UserError
-from codesign_bench.results import load_evaluations
+from codesign_bench.results import DEFAULT_VARIANT, load_evaluations
 from codesign_bench.task import Floats, Task, load_task
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def outcomes_by_region(results: Path, say: Callable[[str], None]) -> pd.DataFram
     frame = load_evaluations(results)
     with_cutout = frame[frame["variant"].str.fullmatch(r"cutout-[\d.]+")]
     pairs = with_cutout[["task", "method"]].drop_duplicates()
-    whole = frame[frame["variant"] == "default"].merge(pairs).assign(cutout=0.0)
+    whole = frame[frame["variant"] == DEFAULT_VARIANT].merge(pairs).assign(cutout=0.0)
     parts = []
     for name, rows in pd.concat([whole, with_cutout]).groupby("task", sort=False):
         try:

@@ -18,7 +18,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.evaluate import evaluate
 from codesign_bench.files import write_bytes
 from codesign_bench.policy_files import load_policy
-from codesign_bench.results import DONE, find_cells
+from codesign_bench.results import DEFAULT_VARIANT, DONE, find_cells
 from codesign_bench.seeding import generator
 from codesign_bench.task import EVALUATION_SEED, Behaviour, Floats, Singles, Task, load_task
 
@@ -102,7 +102,7 @@ def _finished(results: Path, task: str, method: str) -> dict[int, Path]:
     return {
         int(content["seed"]): folder
         for folder, content in find_cells(results)
-        if (content["task"], content["method"], content["variant"]) == (task, method, "default")
+        if (content["task"], content["method"], content["variant"]) == (task, method, DEFAULT_VARIANT)
         and content["status"] == DONE
     }
 

@@ -42,6 +42,8 @@ SCHEMA = 1
 
 CURVE_COLUMNS = ("env_steps", "wall_s", "return_mean", "return_se", "success_rate", "episode_length")
 CELL_COLUMNS = ("task", "method", "variant", "cutout", "alpha", "seed")
+DEFAULT_VARIANT = "default"
+"""Of a cell that differs in nothing from what its task and profile say."""
 LABEL_COLUMN = "label"
 """The method's name in figures, added beside the columns that tell the cell."""
 

@@ -15,7 +15,7 @@ import numpy as np
 from codesign_bench.episodes import Episodes
 from codesign_bench.errors import UserError
 from codesign_bench.policy_files import load_policy
-from codesign_bench.results import DONE, find_cells
+from codesign_bench.results import DEFAULT_VARIANT, DONE, find_cells
 from codesign_bench.task import load_task
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def timing_frame(results: Path) -> pd.DataFrame:
     rows = []
     timed: set[tuple[str, str]] = set()
     for folder, content in find_cells(results):
-        if content["status"] != DONE or content["variant"] != "default":
+        if content["status"] != DONE or content["variant"] != DEFAULT_VARIANT:
             continue
         pair = (content["task"], content["method"])
         rows.append(

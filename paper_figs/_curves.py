@@ -12,6 +12,7 @@ from matplotlib.ticker import EngFormatter, MaxNLocator
 
 from codesign_bench.comparison import is_compared
 from codesign_bench.errors import UserError
+from codesign_bench.results import DEFAULT_VARIANT
 
 from ._order import task_order
 from ._style import BAND_OPACITY, COLUMN_WIDTH, PAGE_WIDTH, Dashes, in_order, line_styles, style
@@ -35,7 +36,7 @@ def default_rows(frame: pd.DataFrame, figure_name: str) -> pd.DataFrame:
     missing = [column for column in NEEDED if column not in frame.columns]
     if missing:
         raise UserError(f"{figure_name}: the results lack the columns {', '.join(missing)}")
-    rows = frame[(frame["variant"] == "default") & frame["return_mean"].notna()]
+    rows = frame[(frame["variant"] == DEFAULT_VARIANT) & frame["return_mean"].notna()]
     if rows.empty:
         raise UserError(f"{figure_name}: no evaluated cell of variant 'default'; run some with: codesign-bench run")
     return rows

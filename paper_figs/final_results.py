@@ -1,7 +1,7 @@
 """Final return and success of every method on every task, with intervals over seeds: the benchmark's table (ours).
 
 Numbers are means over seeds, of the last evaluation of each; seeds that stopped early are left out. Minutes are what
-a cell took as it ran, beside others.
+the median cell took as it ran, beside others: one that had to share its core tells nothing of the method.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
 
     Returns:
         Columns task, method, label, seeds, env_steps (mean over seeds), then for each quantity ("return_mean",
-        "success_rate") itself, `<quantity>_low` and `<quantity>_high` (NaN for fewer than three seeds), and minutes.
+        "success_rate") itself, `<quantity>_low` and `<quantity>_high` (NaN for fewer than three seeds), and minutes
+        (median over seeds).
 
     Raises:
         UserError: a column, or every row of the default variant, is missing.
@@ -63,7 +64,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
                 values = own[name][name].to_numpy()
                 low, high = mean_interval(values, rng)
                 row |= {name: float(values.mean()), f"{name}_low": low, f"{name}_high": high}
-            result.append({**row, "minutes": float(own["wall_s"]["wall_s"].mean()) / 60.0})
+            result.append({**row, "minutes": float(own["wall_s"]["wall_s"].median()) / 60.0})
     return pd.DataFrame(result)
 
 

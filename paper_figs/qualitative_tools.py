@@ -11,6 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from codesign_bench.errors import UserError
+from codesign_bench.results import DEFAULT_VARIANT
 
 from ._order import in_task_order
 from ._style import COLUMN_WIDTH, PAGE_WIDTH, style
@@ -67,7 +68,7 @@ def _rows(frame: pd.DataFrame) -> pd.DataFrame:
     missing = [column for column in NEEDED if column not in frame.columns]
     if missing:
         raise UserError(f"qualitative_tools: the tools lack the columns {', '.join(missing)}")
-    rows = frame[frame["variant"] == "default"]
+    rows = frame[frame["variant"] == DEFAULT_VARIANT]
     if rows.empty:
         raise UserError("qualitative_tools: no finished cell of variant 'default'; run some with: codesign-bench run")
     return in_task_order(rows)

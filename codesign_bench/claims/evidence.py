@@ -16,12 +16,11 @@ from codesign_bench.claims.claim import Lacking
 from codesign_bench.deployment.tables import load_deployment
 from codesign_bench.errors import UserError
 from codesign_bench.profiles import DEFAULT_PROFILE
-from codesign_bench.results import find_cells, load_evaluations, load_results
+from codesign_bench.results import DEFAULT_VARIANT, find_cells, load_evaluations, load_results
 from codesign_bench.sensitivity import load_or_measure
 from codesign_bench.stats import CELL_KEYS, MIN_SEEDS
 from codesign_bench.task import load_task, task_names
 
-DEFAULT = "default"
 DESIGN_PREFIX = "design_"
 
 
@@ -44,7 +43,7 @@ class Evidence:
     profile: str = DEFAULT_PROFILE
     """The profile that the cells were run with, if it is the same for all, so that what is missing can match them."""
 
-    def instances(self, task: str, method: str, variant: str = DEFAULT) -> pd.DataFrame:
+    def instances(self, task: str, method: str, variant: str = DEFAULT_VARIANT) -> pd.DataFrame:
         """Return the final evaluation of the finished cells of one method, task and variant, one row per instance.
 
         Raises:
@@ -57,7 +56,7 @@ class Evidence:
             raise Lacking(f"{told} of {task}/{method}/{variant}; {MIN_SEEDS} are needed")
         return rows
 
-    def final_returns(self, task: str, method: str, variant: str = DEFAULT) -> np.ndarray:
+    def final_returns(self, task: str, method: str, variant: str = DEFAULT_VARIANT) -> np.ndarray:
         """Return the mean return over evaluation instances at the end of training, (N,).
 
         Raises:
@@ -65,7 +64,7 @@ class Evidence:
         """
         return self.instances(task, method, variant).groupby("seed")["return"].mean().to_numpy()
 
-    def curve(self, task: str, method: str, variant: str = DEFAULT) -> pd.DataFrame:
+    def curve(self, task: str, method: str, variant: str = DEFAULT_VARIANT) -> pd.DataFrame:
         """Return the learning curves of the finished cells of one method, task and variant.
 
         Raises:
@@ -77,7 +76,7 @@ class Evidence:
             raise Lacking(f"a finished cell of {task}/{method}/{variant} has no curve")
         return rows[rows["seed"].isin(finished)]
 
-    def budget(self, task: str, method: str, variant: str = DEFAULT) -> float:
+    def budget(self, task: str, method: str, variant: str = DEFAULT_VARIANT) -> float:
         """Return the mean environment steps at the end of training over finished seeds.
 
         Raises:

@@ -12,7 +12,8 @@ from scipy.stats import rankdata
 
 from codesign_bench import stats
 from codesign_bench.claims.claim import Lacking
-from codesign_bench.claims.evidence import DEFAULT, Evidence
+from codesign_bench.claims.evidence import Evidence
+from codesign_bench.results import DEFAULT_VARIANT
 
 OVER_SEEDS = "the 95 % bootstrap interval over seeds"
 BUDGET_TOLERANCE = 0.1
@@ -101,7 +102,7 @@ def check_methods(evidence: Evidence, task: str, *methods: str) -> None:
     Raises:
         Lacking: as `check_budgets` does.
     """
-    check_budgets(evidence, task, *((method, DEFAULT) for method in methods))
+    check_budgets(evidence, task, *((method, DEFAULT_VARIANT) for method in methods))
 
 
 def seeds_of(*samples: np.ndarray) -> str:

@@ -11,12 +11,11 @@ from typing import Any
 from codesign_bench.errors import UserError
 from codesign_bench.progress import duration
 from codesign_bench.registry import names
-from codesign_bench.results import CELL_PATTERN, FAILED, LABEL_COLUMN, cell_status, find_cells
+from codesign_bench.results import CELL_PATTERN, DEFAULT_VARIANT, FAILED, LABEL_COLUMN, cell_status, find_cells
 from codesign_bench.show import status_row
 
 from .tables import NOTHING, Table, listed
 
-DEFAULT_VARIANT = "default"
 NEEDED = ("versions", "host", "timings")
 """Parts of every cell file, besides its configuration, that the page reads from."""
 

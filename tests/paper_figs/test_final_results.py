@@ -41,6 +41,13 @@ def test_the_last_evaluation_counts() -> None:
     assert 1.0 <= row["return_mean_low"] < 3.0 < row["return_mean_high"] <= 6.0
 
 
+def test_a_cell_that_had_to_share_its_core_leaves_the_minutes_alone() -> None:
+    frame = cells("gnn_ppo", [1.0, 2.0, 6.0])
+    frame.loc[frame["seed"] == 1, "wall_s"] *= 9.0
+    (row,) = figure.data(frame).to_dict("records")
+    assert row["minutes"] == 30.0
+
+
 def test_two_seeds_have_no_interval() -> None:
     frame = cells("gnn_ppo", [1.0, 2.0])
     (row,) = figure.data(frame).to_dict("records")

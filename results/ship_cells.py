@@ -1,0 +1,79 @@
+"""Copy finished cells into results that are shipped: `python results/ship_cells.py RUNS [SHIPPED]`.
+
+What only resuming needs stays behind. Of policies, every seed of the paper's method on the default variant and seed 0
+of everything else go along; `--all-policies` takes every one. A cell that is there already is left as it is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from codesign_bench.errors import UserError
+from codesign_bench.experiments import OURS
+from codesign_bench.results import (
+    CELL_FILE,
+    CURVE_FILE,
+    DEFAULT_VARIANT,
+    DONE,
+    EVALUATION_FILE,
+    METRICS_FILE,
+    POLICY_FILE,
+    find_cells,
+    open_folder,
+)
+
+REFERENCE = Path(__file__).resolve().parent / "reference"
+"""Where cells go unless told otherwise."""
+RECORDS = (CURVE_FILE, METRICS_FILE, EVALUATION_FILE, CELL_FILE)
+"""What is shipped of every cell; the file that says it is finished comes last."""
+
+
+def ships_policy(cell: Mapping[str, Any]) -> bool:
+    """Tell whether a cell's policy is shipped."""
+    return bool(cell["seed"] == 0 or (cell["method"] == OURS and cell["variant"] == DEFAULT_VARIANT))
+
+
+def ship(runs: Path, shipped: Path, all_policies: bool = False) -> list[Path]:
+    """Copy the finished cells of `runs` that `shipped` lacks and return their folders there.
+
+    Raises:
+        UserError: `runs` is no results folder, or `shipped` cannot be one.
+    """
+    copied = []
+    cells = [(folder, cell) for folder, cell in find_cells(runs) if cell["status"] == DONE]
+    open_folder(shipped)
+    for folder, cell in cells:
+        target = shipped / folder.relative_to(runs)
+        if (target / CELL_FILE).exists():
+            continue
+        target.mkdir(parents=True, exist_ok=True)
+        policy = (POLICY_FILE,) if all_policies or ships_policy(cell) else ()
+        for name in (*policy, *RECORDS):
+            shutil.copyfile(folder / name, target / name)
+        copied.append(target)
+    return copied
+
+
+def main() -> int:
+    """Copy what the command line names and return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("runs", type=Path, metavar="RUNS")
+    parser.add_argument("shipped", type=Path, metavar="SHIPPED", nargs="?", default=REFERENCE)
+    parser.add_argument("--all-policies", action="store_true")
+    arguments = parser.parse_args()
+    try:
+        copied = ship(arguments.runs, arguments.shipped, arguments.all_policies)
+    except UserError as error:
+        print(error, file=sys.stderr)
+        return 2
+    print("\n".join(str(folder) for folder in copied) or "nothing new")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -207,7 +207,7 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="ends in .gif or .png")
     parser.add_argument("--episodes", type=_whole_number, default=4, metavar="N", help="default: 4")
-    parser.add_argument("--seed", type=_whole_number, default=0, help="of random behaviour; default: 0")
+    parser.add_argument("--seed", type=_seed, default=0, help="of random behaviour; default: 0")
 
 
 def _add_deploy(parser: argparse.ArgumentParser) -> None:
@@ -225,7 +225,7 @@ def _add_deploy(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--latency", type=_whole_number, metavar="STEPS", help="default: 0, protocol 1")
     parser.add_argument("--friction", type=float, metavar="SHARE", help="largest change; default: 0, protocol 0.2")
     parser.add_argument("--mass", type=float, metavar="SHARE", help="largest change; default: 0, protocol 0.2")
-    parser.add_argument("--seed", type=_whole_number, default=0, help="of noise and changes; default: 0")
+    parser.add_argument("--seed", type=_seed, default=0, help="of noise and changes; default: 0")
     parser.add_argument("--no-gifs", action="store_true", help="do not draw the trials")
     parser.add_argument("--out", type=Path, default=DEFAULT_RESULTS, metavar="DIR", help=f"default: {DEFAULT_RESULTS}")
 
@@ -310,6 +310,7 @@ def _run(options: argparse.Namespace, console: Console) -> int:
         )
     )
     check_cells(cells)
+    _check_device(cells[0].config().run.device)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a polite kill is a Ctrl-C
     return run_sweep(
         cells,
@@ -473,7 +474,11 @@ def _check_run(options: argparse.Namespace) -> None:
     check_fractions(options.cutout, options.alpha)
     if options.jobs is not None and options.jobs < 1:
         raise UserError(f"--jobs must be at least 1, not {options.jobs}")
-    if options.device == "cuda":
+
+
+def _check_device(device: str) -> None:
+    """Refuse a GPU that is not there: `--device` and `--set device` alike."""
+    if device == "cuda":
         import torch
 
         if not torch.cuda.is_available():
@@ -510,6 +515,12 @@ def _whole_number(text: str) -> int:
         return parse_int(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"'{text}' is no whole number") from None
+
+
+def _seed(text: str) -> int:
+    if (seed := _whole_number(text)) < 0:
+        raise argparse.ArgumentTypeError(f"a seed is at least 0, not {seed}")
+    return seed
 
 
 def _extend_path(imports: Sequence[str]) -> None:

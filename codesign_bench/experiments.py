@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from codesign_bench.cell import Cell, grid
 from codesign_bench.errors import unknown_name
-from codesign_bench.paper_tables import PROTOCOL, SCENES
+from codesign_bench.paper_tables import PROTOCOL, REAL_ROBOT, SCENES
 
 OURS = "gnn_ppo"
 """The paper's own method."""
@@ -67,10 +67,13 @@ class Experiment:
     """Grids to run, one stage after the other; a later stage may go on from cells of an earlier one."""
     sweeps: bool = False
     """Whether it needs the sweep of the baseline's hyperparameters."""
+    deploys: tuple[str, ...] = ()
+    """Tasks whose policy, the first seed of our method, plays the trials on the arm."""
 
 
 ALL_TASKS = tuple(SCENES)
 FEWER = PROTOCOL.seeds_generalisation
+ON_AN_ARM = tuple(REAL_ROBOT.own_successes)
 STARTS = tuple(range(1, 1 + len(PROTOCOL.fine_tuning_starts)))
 
 EXPERIMENTS: dict[str, Experiment] = {
@@ -108,22 +111,31 @@ EXPERIMENTS: dict[str, Experiment] = {
         "section 'Trading off design and control complexity'",
         ((Grid(("catch_balls",), seeds=FEWER, alphas=PROTOCOL.alphas),),),
     ),
+    "deployment": Experiment(
+        ("deployment",),
+        "section 'Evaluation on a real robot'",
+        ((Grid(ON_AN_ARM, seeds=1),),),
+        deploys=ON_AN_ARM,
+    ),
     "baseline_sweep": Experiment(("baseline_sweep",), "appendix, table of baseline hyperparameters", sweeps=True),
 }
 """By name, cheap ones first."""
 
 
 def experiments_named(names: Sequence[str]) -> dict[str, Experiment]:
-    """Return the experiments that `names` mean; none or `all` means every one.
+    """Return the experiments that `names` mean: their own names or those of figures; none or `all` means every one.
 
     Raises:
         UserError: an unknown name.
     """
-    chosen = list(EXPERIMENTS) if not names or "all" in names else list(dict.fromkeys(names))
-    for name in chosen:
-        if name not in EXPERIMENTS:
-            raise unknown_name("experiment", name, (*EXPERIMENTS, "all"))
-    return {name: EXPERIMENTS[name] for name in chosen}
+    if not names or "all" in names:
+        return dict(EXPERIMENTS)
+    of_figure = {figure: name for name, experiment in EXPERIMENTS.items() for figure in experiment.figures}
+    known = of_figure | {name: name for name in EXPERIMENTS}
+    for name in names:
+        if name not in known:
+            raise unknown_name("experiment", name, (*dict.fromkeys([*EXPERIMENTS, *of_figure]), "all"))
+    return {known[name]: EXPERIMENTS[known[name]] for name in names}
 
 
 def stages_of(experiments: Sequence[Experiment], profile: str, seeds: int | None = None) -> list[list[Cell]]:

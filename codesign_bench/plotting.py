@@ -158,6 +158,8 @@ def draw_figures(
         raise UserError(f"--compare: {', '.join(wanted)} show no curves; choose from: {', '.join(choices)}")
     if not wanted and not results.is_dir():
         raise UserError(f"no results folder '{results}'; make one with: codesign-bench run --out {results}")
+    if compare is not None:
+        load_results(compare)  # a wrong folder is an error, not a reason to leave the curves out
     make_folder(out)
     drawn: list[Path] = []
     for drawing in _drawings(modules, results, say, bool(wanted), compare):

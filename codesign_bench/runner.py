@@ -187,7 +187,8 @@ def _refuse_without_pretrained(cells: Sequence[Cell], out: Path) -> None:
             if content is None or content["status"] != DONE:
                 raise UserError(
                     f"--finetune: {cell.name} goes on from {before.name}, which is not done in {out}\nrun it first: "
-                    f"codesign-bench run --method {cell.method} --task {cell.task} --seeds {cell.seed}-{cell.seed}"
+                    f"codesign-bench run --method {cell.method} --task {cell.task} --seeds {cell.seed}-{cell.seed} "
+                    f"--profile {cell.profile} --out {out}, with the same --set if any"
                 )
 
 

@@ -17,6 +17,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.stats import ecdf, mannwhitneyu, trim_mean
 
+from codesign_bench.seeding import generator
+
 RESAMPLES = 2000
 CONFIDENCE = 0.95
 
@@ -110,6 +112,11 @@ def mean_interval(
 ) -> tuple[float, float]:
     """Return the same interval of the mean of (N,) values."""
     return _interval([values], lambda sample: sample.mean(axis=1), rng, confidence, resamples)
+
+
+def final_rng(task: str, method: str, variant: str, column: str) -> np.random.Generator:
+    """Return what draws the resamples of a method's final values, so that every page gives them the same interval."""
+    return generator(0, f"final {column} {task} {method} {variant}")
 
 
 def mean_difference_interval(

@@ -84,7 +84,7 @@ def method_labels(frame: pd.DataFrame) -> dict[str, str]:
 def _draw_panel(axes: Axes, curves: pd.DataFrame, quantity: str, styles: dict[str, tuple[str, Dashes]]) -> None:
     """Draw one quantity of one task."""
     for method in reversed(in_order(curves["method"])):  # the paper's own method lies on top
-        _draw_curve(axes, curves[curves["method"] == method], *styles[method], gid=method)
+        draw_curve(axes, curves[curves["method"] == method], *styles[method], gid=method)
     axes.set_xlabel("environment steps")
     axes.set_ylabel(QUANTITIES[quantity])
     axes.xaxis.set_major_formatter(EngFormatter(sep=""))
@@ -93,8 +93,13 @@ def _draw_panel(axes: Axes, curves: pd.DataFrame, quantity: str, styles: dict[st
         axes.set_ylim(-0.03, 1.03)
 
 
-def _draw_curve(axes: Axes, curve: pd.DataFrame, colour: str, dashes: Dashes, gid: str) -> None:
-    """Draw one method's line and band; where some seeds are missing, the line is dotted."""
+def draw_curve(axes: Axes, curve: pd.DataFrame, colour: str, dashes: Dashes, gid: str) -> None:
+    """Draw one line and its band; where some seeds are missing, the line is dotted.
+
+    Args:
+        curve: columns env_steps, centre, low, high (NaN where there is no interval), seeds (how many got this far).
+        gid: names the line in a test or an SVG.
+    """
     curve = _without_slivers(curve)
     complete = curve["seeds"] == curve["seeds"].max()
     steps, values = curve["env_steps"], curve["centre"]

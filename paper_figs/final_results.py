@@ -12,8 +12,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from codesign_bench.seeding import generator
-from codesign_bench.stats import CONFIDENCE, MIN_SEEDS, final_values, mean_interval
+from codesign_bench.results import DEFAULT_VARIANT
+from codesign_bench.stats import CONFIDENCE, MIN_SEEDS, final_rng, final_values, mean_interval
 from codesign_bench.text_tables import latex, markdown
 
 from ._curves import PANELS_PER_ROW, QUANTITIES, default_rows, method_labels
@@ -46,7 +46,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column, or every row of the default variant, is missing.
     """
-    rows, rng = default_rows(frame, "final_results"), generator(0, "final_results")
+    rows = default_rows(frame, "final_results")
     labels = method_labels(frame)
     finals = {name: final_values(rows, name) for name in (*QUANTITIES, "wall_s")}
     result = []
@@ -62,7 +62,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
             }
             for name in QUANTITIES:
                 values = own[name][name].to_numpy()
-                low, high = mean_interval(values, rng)
+                low, high = mean_interval(values, final_rng(task, method, DEFAULT_VARIANT, name))
                 row |= {name: float(values.mean()), f"{name}_low": low, f"{name}_high": high}
             result.append({**row, "minutes": float(own["wall_s"]["wall_s"].median()) / 60.0})
     return pd.DataFrame(result)

@@ -13,7 +13,8 @@ from matplotlib.lines import Line2D
 from codesign_bench.errors import UserError
 from codesign_bench.stats import MIN_SEEDS, curve_statistics
 
-from ._style import BAND_OPACITY, COLOURS, COLUMN_WIDTH, PAGE_WIDTH, style
+from ._curves import draw_curve
+from ._style import COLOURS, COLUMN_WIDTH, PAGE_WIDTH, style
 
 TITLE = "Fine-tuning"
 KINDS = {
@@ -21,7 +22,9 @@ KINDS = {
     "scratch": ("from scratch", COLOURS["shared_arch"]),
 }
 """Kind of cell, the beginning of its variant's name: its name in the legend, and its colour."""
-INTERVAL = f"line: mean over seeds; band: ± standard error, if {MIN_SEEDS} seeds or more"
+INTERVAL = (
+    f"line: mean over seeds; dotted: not all seeds got this far; band: ± standard error, if {MIN_SEEDS} seeds or more"
+)
 NEEDED = ("task", "method", "variant", "seed", "return_mean", "gradient_steps")
 PANELS_PER_ROW = 4
 
@@ -88,8 +91,7 @@ def _draw_panel(axes: Axes, part: pd.DataFrame) -> None:
     """Draw both kinds of one start."""
     for kind, (_, colour) in KINDS.items():
         curve = part[part["kind"] == kind]
-        steps, values, error = curve["gradient_steps"], curve["mean"], curve["standard_error"]
-        axes.plot(steps, values, color=colour, gid=kind)
-        if error.notna().any():
-            axes.fill_between(steps, values - error, values + error, color=colour, alpha=BAND_OPACITY, linewidth=0)
+        values, error = curve["mean"], curve["standard_error"]
+        along = curve.assign(env_steps=curve["gradient_steps"], centre=values, low=values - error, high=values + error)
+        draw_curve(axes, along, colour, "-", gid=kind)
     axes.set_xlabel("gradient steps")

@@ -90,6 +90,7 @@ def test_status_tells_why_a_cell_failed(tmp_path: Path, capsys: pytest.CaptureFi
         ([*RUN, "--alpha", "-0.5"], "--alpha"),
         ([*RUN, "--alpha", "nan"], "--alpha"),
         ([*RUN, "--device", "cuda"], "--device"),
+        ([*RUN, "--set", "device=cuda"], "--device"),
         ([*RUN, "--device", "abacus"], "cuda"),
         ([*RUN, "--scheduler", "tcp://localhost:1"], "--scheduler goes with --backend dask"),
         ([*RUN, "--backend", "ray"], "--backend"),

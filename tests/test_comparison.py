@@ -49,3 +49,14 @@ def test_a_figure_without_curves_says_so(tmp_path: Path, capsys: pytest.CaptureF
     arguments = ["plot", "tradeoff", "--results", str(REFERENCE), "--compare", str(REFERENCE), "--out", str(tmp_path)]
     assert main(arguments) == 2
     assert "choose from: learning_curves" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("names", [[], ["learning_curves"]])
+def test_a_folder_that_is_not_there_is_an_error_whatever_is_drawn(
+    names: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "figures"
+    arguments = ["plot", *names, "--results", str(REFERENCE), "--compare", str(tmp_path / "no"), "--out", str(out)]
+    assert main(arguments) == 2
+    assert f"no results folder '{tmp_path / 'no'}'" in capsys.readouterr().err
+    assert not out.exists()

@@ -88,6 +88,12 @@ def test_bad_input_gets_one_line(capsys: pytest.CaptureFixture[str], arguments: 
     assert error.count("\n") == 1
 
 
+@pytest.mark.parametrize("command", [["render", "--out", "push.png"], ["deploy", "--policy", "x"]])
+def test_a_seed_below_zero_is_refused(capsys: pytest.CaptureFixture[str], command: list[str]) -> None:
+    assert main([*command, "--seed", "-1"]) == 2
+    assert "argument --seed: a seed is at least 0, not -1" in capsys.readouterr().err
+
+
 @pytest.mark.usefixtures("toy")
 def test_a_task_without_pictures_or_script_says_so(tmp_path: Path) -> None:
     task = load_task("toy_reach")

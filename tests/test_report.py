@@ -24,6 +24,7 @@ from codesign_bench.report.final_values import STRIP_MARGIN, STRIP_WIDTH, estima
 from codesign_bench.report.page import code_spans, write_report
 from codesign_bench.report.provenance import code_version, configurations, version_table
 from codesign_bench.results import CURVE_COLUMNS, cell_lock, load_results, write_cell, write_rows
+from codesign_bench.seeding import generator
 
 ATTACK = "<script>alert('x')</script><img src=http://example.com/x onerror=alert(1)>"
 TASK, METHOD = "reach", "gnn_ppo"
@@ -224,20 +225,20 @@ def test_methods_with_different_budgets_are_ranked_with_a_caution(tmp_path: Path
 
 
 def test_an_estimate_has_an_interval_from_three_seeds_on() -> None:
-    assert estimate([1.0, 3.0], "two").text == "2.00"
-    assert not estimate([1.0, 3.0], "two").has_interval
-    assert estimate([-2.0, -2.0, -2.0], "three").text == "−2.00 [−2.00, −2.00]"  # noqa: RUF001
+    assert estimate([1.0, 3.0], generator(0, "two")).text == "2.00"
+    assert not estimate([1.0, 3.0], generator(0, "two")).has_interval
+    assert estimate([-2.0, -2.0, -2.0], generator(0, "three")).text == "−2.00 [−2.00, −2.00]"  # noqa: RUF001
 
 
 def test_marks_stand_where_the_values_are() -> None:
-    drawn = strip(estimate([0.0, 0.5, 1.0], "three"), (0.0, 1.0))
+    drawn = strip(estimate([0.0, 0.5, 1.0], generator(0, "three")), (0.0, 1.0))
     assert drawn.dots == [STRIP_MARGIN, STRIP_WIDTH / 2.0, STRIP_WIDTH - STRIP_MARGIN]
     assert drawn.mean == STRIP_WIDTH / 2.0
     assert STRIP_MARGIN <= drawn.low < drawn.mean < drawn.high <= STRIP_WIDTH - STRIP_MARGIN
 
 
 def test_a_strip_without_width_puts_its_dots_in_the_middle() -> None:
-    assert strip(estimate([2.0], "one"), (2.0, 2.0)).dots == [STRIP_WIDTH / 2.0]
+    assert strip(estimate([2.0], generator(0, "one")), (2.0, 2.0)).dots == [STRIP_WIDTH / 2.0]
 
 
 @pytest.mark.parametrize(
@@ -263,7 +264,7 @@ def test_a_strip_without_width_puts_its_dots_in_the_middle() -> None:
     ],
 )
 def test_the_verdict_says_how_sure_the_order_is(values: dict[str, list[float]], expected: str) -> None:
-    assert verdict([(label, estimate(numbers, label)) for label, numbers in values.items()]) == expected
+    assert verdict([(label, estimate(numbers, generator(0, label))) for label, numbers in values.items()]) == expected
 
 
 def test_settings_that_differ_between_cells_get_a_line_for_each_value(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,11 @@ from codesign_bench.cli import main
 from codesign_bench.errors import UserError
 from codesign_bench.experiments import EXPERIMENTS, Experiment, Grid, experiments_named, stages_of
 from codesign_bench.paper_tables import CMA_ES_SWEEP, PROTOCOL
+from codesign_bench.registry import names
 from codesign_bench.reproduce import reproduce
 from codesign_bench.task import load_task, task_names
+
+REFERENCE = Path(__file__).resolve().parent.parent / "results" / "reference"
 
 
 def variants(name: str, profile: str = "paper") -> dict[str, int]:
@@ -54,6 +58,55 @@ def test_tasks_have_what_their_experiments_ask_for() -> None:
     task = load_task("fetch_cube")
     for fraction in PROTOCOL.cutout_fractions:
         assert task.in_cutout(task.evaluation_instances(), fraction).any()
+
+
+def test_every_figure_is_of_an_experiment_and_may_be_named_instead() -> None:
+    for name in names("paper_figs"):
+        (experiment,) = experiments_named([name]).values()
+        assert name in experiment.figures
+    assert list(experiments_named(["final_results", "learning_curves_iqm"])) == ["learning_curves"]
+
+
+def test_an_experiment_without_cells_ends_well_in_an_empty_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["reproduce", "hyperparameter_tables"]) == 0
+    told = capsys.readouterr().out
+    assert "hyperparameter_tables.png" in told
+    assert "report left out: no results folder" in told
+
+
+@pytest.mark.usefixtures("toy")
+def test_nothing_drawn_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(experiments, "EXPERIMENTS", {"toy": Experiment(("tradeoff",), "ours")})
+    with pytest.raises(UserError, match="nothing can be drawn of toy"):
+        reproduce(["toy"], profile="quick", results=tmp_path, figures=tmp_path / "figures", console=Console())
+
+
+@pytest.mark.skipif(not REFERENCE.exists(), reason="a source distribution leaves the results out")
+def test_the_trials_on_an_arm_are_played_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    runs = tmp_path / "runs"
+    monkeypatch.setattr(
+        experiments, "EXPERIMENTS", {"deployment": replace(EXPERIMENTS["deployment"], stages=(), deploys=("lift_cup",))}
+    )
+    shutil.copytree(
+        REFERENCE / "lift_cup" / "gnn_ppo" / "default" / "seed-00", runs / "lift_cup/gnn_ppo/default/seed-00"
+    )
+
+    def run() -> str:
+        console = Console(record=True, width=300, file=io.StringIO())
+        code = reproduce(
+            ["deployment"], profile="laptop", results=runs, figures=tmp_path / "figures", console=console, jobs=1
+        )
+        assert code == 0
+        return console.export_text()
+
+    assert "own-tool-1-trial-1: " in run()
+    trials = pd.read_csv(runs / "deployment" / "lift_cup" / "protocol.csv")
+    assert len(trials) == 4 * 5
+    assert (tmp_path / "figures" / "deployment.png").exists()
+    assert "own-tool-1-trial-1: " not in run()
 
 
 def test_an_unknown_experiment_lists_the_choices(capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import inf
 
-from codesign_bench.learning.ranges import check_range
+from codesign_bench.learning.ranges import check_given, check_range
 
 TRANSFORM2ACT = {"source": "Transform2Act's default; the paper is silent"}
 OURS = {"source": "ours"}
@@ -96,6 +96,7 @@ class GraphConfig(PPOConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_range(self, 1, inf, "control_gnn", "control_index_mlp", "design_gnn", "design_index_mlp", "value_mlp")
+        check_given(self, "control_gnn", "design_gnn")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,3 +111,4 @@ class PerceptronConfig(PPOConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_range(self, 1, inf, "policy_net", "value_net")
+        check_given(self, "policy_net", "value_net")

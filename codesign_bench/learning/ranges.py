@@ -1,4 +1,4 @@
-"""Range checks of hyperparameters; a value out of range is told before anything runs."""
+"""Checks of hyperparameters; a value that cannot be is told before anything runs."""
 
 from __future__ import annotations
 
@@ -17,3 +17,14 @@ def check_range(config: Any, low: float, high: float, *names: str) -> None:
             if number is not None and not low <= number <= high:
                 limit = f"at least {low:g}" if high == float("inf") else f"from {low:g} to {high:g}"
                 raise ValueError(f"{name} must be {limit}, not {value}")
+
+
+def check_given(config: Any, *names: str) -> None:
+    """Check that the tuples `names` of a configuration hold something.
+
+    Raises:
+        ValueError: naming the first that does not.
+    """
+    for name in names:
+        if not getattr(config, name):
+            raise ValueError(f"{name} must have at least one entry")

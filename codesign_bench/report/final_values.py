@@ -16,6 +16,7 @@ from codesign_bench.seeding import generator
 from codesign_bench.stats import (
     CELL_KEYS,
     MIN_SEEDS,
+    final_rng,
     final_values,
     interquartile_mean,
     mean,
@@ -117,9 +118,9 @@ def task_results(cells: Sequence[CellRecord], curves: pd.DataFrame) -> list[Task
     ]
 
 
-def estimate(values: Sequence[float], stream: str) -> Estimate:
-    """Return means and interval of (N,) values; `stream` names the interval's random numbers."""
-    low, high = mean_interval(values, generator(SEED, f"report {stream}"))
+def estimate(values: Sequence[float], rng: np.random.Generator) -> Estimate:
+    """Return means and interval of (N,) values; `rng` draws the interval's resamples."""
+    low, high = mean_interval(values, rng)
     return Estimate(tuple(values), mean(values), interquartile_mean(values), low, high)
 
 
@@ -157,9 +158,10 @@ def _task_result(cells: Sequence[CellRecord], task: str, variant: str, final: pd
     methods, returns = [], []
     for method in in_order("methods", final["method"]):
         rows, of_method = final[final["method"] == method], [cell for cell in group if cell.method == method]
-        stream = f"{task} {method} {variant}"
-        earned = estimate(rows["return_mean"].tolist(), f"return {stream}")
-        solved = estimate(rows["success_rate"].tolist(), f"success {stream}")
+        earned, solved = (
+            estimate(rows[column].tolist(), final_rng(task, method, variant, column))
+            for column in ("return_mean", "success_rate")
+        )
         returns.append((of_method[0].label, earned))
         methods.append(
             MethodResult(

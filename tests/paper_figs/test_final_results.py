@@ -10,6 +10,8 @@ import pytest
 
 from codesign_bench.errors import UserError
 from codesign_bench.registry import load_module
+from codesign_bench.report.final_values import estimate
+from codesign_bench.stats import final_rng
 
 figure: Any = load_module("paper_figs", "final_results")
 
@@ -46,6 +48,13 @@ def test_a_cell_that_had_to_share_its_core_leaves_the_minutes_alone() -> None:
     frame.loc[frame["seed"] == 1, "wall_s"] *= 9.0
     (row,) = figure.data(frame).to_dict("records")
     assert row["minutes"] == 30.0
+
+
+def test_the_report_gives_the_same_intervals() -> None:
+    finals = [1.0, 2.0, 6.0, 7.0, 7.5]
+    (row,) = figure.data(cells("gnn_ppo", finals)).to_dict("records")
+    told = estimate(finals, final_rng("push", "gnn_ppo", "default", "return_mean"))
+    assert (row["return_mean_low"], row["return_mean_high"]) == (told.low, told.high)
 
 
 def test_two_seeds_have_no_interval() -> None:

@@ -14,6 +14,8 @@ from codesign_bench.registry import load_module
 
 figure: Any = load_module("paper_figs", "fine_tuning")
 
+GIDS = ("finetune", "finetune (fewer seeds)")
+
 
 def results(seeds: int = 3) -> pd.DataFrame:
     """Return curves of three gradient-step counts for two starts and both kinds, and a default cell."""
@@ -49,6 +51,17 @@ def test_every_start_has_a_panel_with_both_kinds_and_no_band_below_three_seeds()
     assert all(len(axes.collections) == 2 for axes in banded.axes if axes.get_visible())
     (legend,) = banded.legends
     assert [text.get_text() for text in legend.get_texts()] == ["from the trained policy (n=3)", "from scratch (n=3)"]
+
+
+def test_where_seeds_have_ended_the_line_is_dotted() -> None:
+    frame = results()
+    frame.loc[(frame["seed"] == 2) & (frame["env_steps"] == 2_000), "gradient_steps"] = 60  # Ends before the others.
+    axes = figure.draw(frame).axes[0]
+    solid, dotted = (next(line for line in axes.lines if line.get_gid() == gid) for gid in GIDS)
+    assert np.isnan(solid.get_ydata()[-1])
+    assert dotted.get_linestyle() == ":"
+    assert dotted.get_xdata()[-1] == 80
+    assert np.isfinite(dotted.get_ydata()[-1])
 
 
 def test_results_without_such_cells_are_refused() -> None:

@@ -55,7 +55,8 @@ def draw_curves(table: pd.DataFrame, labels: dict[str, str], note: str) -> Figur
     tasks = task_order(table["task"])
     columns = min(len(tasks), PANELS_PER_ROW)
     rows = len(QUANTITIES) * math.ceil(len(tasks) / columns)
-    width = COLUMN_WIDTH if columns == 1 else PAGE_WIDTH
+    narrow = columns == 1 and not _compares(table)
+    width = COLUMN_WIDTH if narrow else PAGE_WIDTH
     with style():
         figure = Figure(figsize=(width, rows * PANEL_HEIGHT + 0.9), layout="constrained")
         axes = figure.subplots(rows, columns, squeeze=False)
@@ -68,7 +69,7 @@ def draw_curves(table: pd.DataFrame, labels: dict[str, str], note: str) -> Figur
             axes[top, column].set_title(str(task).replace("_", " "))
         for axis in axes.flat:
             axis.set_visible(axis.has_data())
-        _add_legend(figure, table, labels, note, columns=_legend_columns(table, narrow=columns == 1))
+        _add_legend(figure, table, labels, note, columns=_legend_columns(table, narrow))
         figure.draw_without_rendering()  # ticks take their settings when first drawn, which must be before leaving
     return figure
 
@@ -137,9 +138,14 @@ def _add_legend(figure: Figure, table: pd.DataFrame, labels: dict[str, str], not
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, title=note, title_fontsize=5.5)
 
 
-def _legend_columns(table: pd.DataFrame, *, narrow: bool) -> int:
-    """Return how many entries of the legend stand side by side: compared results have long names."""
-    return (2 if narrow else 3) - any(is_compared(name) for name in table["method"].unique())
+def _legend_columns(table: pd.DataFrame, narrow: bool) -> int:
+    """Return how many entries of the legend stand side by side."""
+    return 2 if narrow or _compares(table) else 3
+
+
+def _compares(table: pd.DataFrame) -> bool:
+    """Tell whether there are compared results, which have long names."""
+    return any(is_compared(name) for name in table["method"].unique())
 
 
 def _seed_count(rows: pd.DataFrame) -> str:

@@ -23,7 +23,7 @@ METHODS: tuple[str, ...] = import_module("codesign_bench.methods").ORDER
 pytestmark = pytest.mark.skipif(not REFERENCE.exists(), reason="a source distribution leaves the results out")
 
 
-SEEDS = {"fetch_cube": 3, "scoop_3d": 3}
+SEEDS = {"scoop_3d": 3}
 """Where there are not six of every method."""
 
 

@@ -181,7 +181,8 @@ def save(drawing: Drawing, out: Path) -> list[Path]:
     paths = [out / f"{drawing.name}.csv", out / f"{drawing.name}.pdf", out / f"{drawing.name}.png"]
     write_bytes(paths[0], csv_bytes(drawing.table))
     for path in paths[1:]:
-        drawing.figure.savefig(path)
+        undated = {"CreationDate": None} if path.suffix == ".pdf" else None  # the same results give the same file
+        drawing.figure.savefig(path, metadata=undated)
     for ending, text in drawing.texts.items():
         paths.insert(0, out / f"{drawing.name}.{ending}")
         write_bytes(paths[0], text.encode())

@@ -8,6 +8,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 import codesign_bench as cb
@@ -15,6 +16,7 @@ from codesign_bench.cli import main
 from codesign_bench.config import differences, resolve
 from codesign_bench.evaluate import evaluate
 from codesign_bench.method import load_method
+from codesign_bench.registry import load_module
 from codesign_bench.results import read_cell
 
 REFERENCE = Path(__file__).resolve().parent.parent / "results" / "reference"
@@ -53,6 +55,13 @@ def test_the_shipped_claims_are_those_of_the_shipped_results(tmp_path: Path) -> 
         for folder in (tmp_path, REFERENCE / "claims")
     )
     assert made == shipped
+
+
+@pytest.mark.parametrize("name", ["learning_curves", "final_results", "fine_tuning"])
+def test_the_shipped_figures_show_the_shipped_cells(name: str) -> None:
+    shown = pd.read_csv(REFERENCE / "figures" / f"{name}.csv")
+    held = load_module("paper_figs", name).data(cb.load_results(REFERENCE))
+    pd.testing.assert_frame_equal(shown, held, check_dtype=False)
 
 
 def test_the_folder_stays_small() -> None:

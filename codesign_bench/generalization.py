@@ -5,13 +5,14 @@ Shapes: `N` evaluation instances, `P` places, `I` instance.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from codesign_bench.errors import UserError
+from codesign_bench.outside import load_or_measure
 from codesign_bench.results import DEFAULT_VARIANT, load_evaluations
 from codesign_bench.task import Floats, Task, load_task
 
@@ -32,10 +33,16 @@ PLACES = 14_400
 """Places of a grid, however many axes it has."""
 
 
-def outcomes_by_region(results: Path, say: Callable[[str], None]) -> pd.DataFrame:
+def outcomes_by_region(results: Path, say: Callable[[str], None], measure: bool = False) -> pd.DataFrame:
     """Return the evaluations of all cells with a cutout, and the places that tell where the regions lie.
 
-    Cells of the same method and task that trained on the whole region stand beside them as fraction 0.
+    Cells of the same method and task that trained on the whole region stand beside them as fraction 0. What policies
+    reach around the training region, which no evaluation tells, is added as far as it was measured.
+
+    Args:
+        results: a results folder.
+        say: is told what is left out or measured.
+        measure: play the policies around the training region that were not played there yet.
 
     Returns:
         Rows of kind `START`: the columns of `load_evaluations`; rows of kind `PLACE`: task and cutout. Both have kind,
@@ -51,7 +58,8 @@ def outcomes_by_region(results: Path, say: Callable[[str], None]) -> pd.DataFram
     pairs = with_cutout[["task", "method"]].drop_duplicates()
     whole = frame[frame["variant"] == DEFAULT_VARIANT].merge(pairs).assign(cutout=0.0)
     parts = []
-    for name, rows in pd.concat([whole, with_cutout]).groupby("task", sort=False):
+    inside = pd.concat([whole, with_cutout])
+    for name, rows in pd.concat([inside, *_around(results, inside, say, measure)]).groupby("task", sort=False):
         try:
             task = load_task(str(name))
             parts.append(_starts(task, rows))
@@ -63,6 +71,17 @@ def outcomes_by_region(results: Path, say: Callable[[str], None]) -> pd.DataFram
             f"no finished cell with a cutout in '{results}'; make some with: codesign-bench run --cutout 0.6"
         )
     return pd.concat(parts, ignore_index=True)
+
+
+def _around(results: Path, inside: pd.DataFrame, say: Callable[[str], None], measure: bool) -> Iterator[pd.DataFrame]:
+    """Yield for every task, method and variant of `inside` what its policies reach around the training region."""
+    told = ["task", "method", "label", "variant", "cutout"]
+    for task, method, label, variant, cutout in inside[told].drop_duplicates().itertuples(index=False):
+        try:
+            table = load_or_measure(results, [(task, method)], say, measure, variant)
+        except UserError:
+            continue  # not measured, or a task without positions: the region then has no line
+        yield table.assign(label=label, variant=variant, cutout=cutout)
 
 
 def regions(task: Task, instances: Floats, fraction: float) -> NDArray[np.str_]:

@@ -1,7 +1,7 @@
 """What trained policies reach on positions just outside the region that they were trained on (paper, section 5.2).
 
 The evaluation instances of a task lie inside its region; these lie around it, in a rim of `RIM` times its extent. The
-tables lie beside the cells, one per task and method, and are measured once for each set of finished seeds.
+tables lie beside the cells, one per task, method and variant; every finished policy is played once.
 
 Shapes: `N` instances, `I` instance, `B` batch, `D` design, `C` control.
 """
@@ -18,7 +18,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.evaluate import evaluate
 from codesign_bench.files import write_bytes
 from codesign_bench.policy_files import load_policy
-from codesign_bench.results import DEFAULT_VARIANT, DONE, find_cells
+from codesign_bench.results import DEFAULT_VARIANT, DONE, POLICY_FILE, find_cells
 from codesign_bench.seeding import generator
 from codesign_bench.task import EVALUATION_SEED, Behaviour, Floats, Singles, Task, load_task
 
@@ -69,11 +69,15 @@ def outside_instances(task: Task) -> Floats:
 
 
 def load_or_measure(
-    results: Path, pairs: Sequence[tuple[str, str]], say: Callable[[str], None], measure_missing: bool
+    results: Path,
+    pairs: Sequence[tuple[str, str]],
+    say: Callable[[str], None],
+    measure_missing: bool,
+    variant: str = DEFAULT_VARIANT,
 ) -> pd.DataFrame:
-    """Return what the finished default cells of each (task, method) reach outside, one row per seed and instance.
+    """Return what the finished cells of each (task, method) in a variant reach outside, one row per seed and instance.
 
-    A table of other seeds than are finished now counts as missing.
+    Seeds that were finished since, and whose policies are there, count as missing.
 
     Raises:
         UserError: nothing is measured yet and nothing may be, or can be, measured.
@@ -82,12 +86,13 @@ def load_or_measure(
 
     frames = []
     for task, method in pairs:
-        path = results / FOLDER / f"{task}-{method}.csv"
-        cells = _finished(results, task, method)
+        path = results / FOLDER / f"{'-'.join([task, method, *([] if variant == DEFAULT_VARIANT else [variant])])}.csv"
         table = pd.read_csv(path) if path.exists() else pd.DataFrame(columns=list(COLUMNS))
-        if measure_missing and cells and set(table["seed"]) != set(cells):
-            say(f"{FOLDER}: playing {len(cells)} policies of {task}/{method}; kept in {path}")
-            table = _measure(task, method, cells)
+        seeds = set(table["seed"])
+        new = {seed: cell for seed, cell in _finished(results, task, method, variant).items() if seed not in seeds}
+        if measure_missing and new:
+            say(f"{FOLDER}: playing {len(new)} policies of {task}/{method}/{variant}; kept in {path}")
+            table = pd.concat([*([table] if len(table) else []), _measure(task, method, new)], ignore_index=True)
             path.parent.mkdir(exist_ok=True)
             write_bytes(path, table.to_csv(index=False, lineterminator="\n").encode())
         if len(table):
@@ -97,13 +102,14 @@ def load_or_measure(
     return pd.concat(frames, ignore_index=True)
 
 
-def _finished(results: Path, task: str, method: str) -> dict[int, Path]:
-    """Return the folders of finished default cells by seed."""
+def _finished(results: Path, task: str, method: str, variant: str) -> dict[int, Path]:
+    """Return the folders of finished cells that hold their policies, by seed."""
     return {
         int(content["seed"]): folder
         for folder, content in find_cells(results)
-        if (content["task"], content["method"], content["variant"]) == (task, method, DEFAULT_VARIANT)
+        if (content["task"], content["method"], content["variant"]) == (task, method, variant)
         and content["status"] == DONE
+        and (folder / POLICY_FILE).exists()
     }
 
 

@@ -51,8 +51,7 @@ def _designed_tools(results: Path, say: Callable[[str], None], wanted: bool) -> 
 def _generalization(results: Path, say: Callable[[str], None], wanted: bool) -> pd.DataFrame:
     from codesign_bench.generalization import outcomes_by_region
 
-    del wanted
-    return outcomes_by_region(results, say)
+    return outcomes_by_region(results, say, measure=wanted)
 
 
 def _hyperparameters(results: Path, say: Callable[[str], None], wanted: bool) -> pd.DataFrame:

@@ -9,7 +9,9 @@ import pytest
 
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
+from codesign_bench.generalization import OUTSIDE, START, outcomes_by_region
 from codesign_bench.outside import INSTANCES, RIM, load_or_measure, outside_instances
+from codesign_bench.results import POLICY_FILE
 from codesign_bench.task import load_task
 
 pytestmark = pytest.mark.usefixtures("toy")
@@ -58,3 +60,28 @@ def test_policies_are_measured_once_for_each_set_of_finished_seeds(tmp_path: Pat
     # The toy's reward is minus the distance of tip and goal, so a return is never positive.
     assert (first["return"] <= 0.0).all()
     assert first["success"].isin([0, 1]).all()
+
+
+def test_the_figure_of_generalisation_plays_every_policy_around_the_region_once(tmp_path: Path) -> None:
+    told: list[str] = []
+    assert main([*RUN, "--seeds", "2", "--out", str(tmp_path)]) == 0
+    assert main([*RUN, "--seeds", "1", "--cutout", "0.4", "--out", str(tmp_path)]) == 0
+    before = outcomes_by_region(tmp_path, told.append)
+    assert OUTSIDE not in set(before.loc[before["kind"] == START, "region"])
+    assert not told
+    frame = outcomes_by_region(tmp_path, told.append, measure=True)
+    around = frame[(frame["kind"] == START) & (frame["region"] == OUTSIDE)]
+    assert around.groupby("cutout")["seed"].unique().map(sorted).to_dict() == {0.0: [0, 1], 0.4: [0]}
+    assert ((around["x"] < 0.0) | (around["x"] > 1.0)).all()
+    assert len(told) == 2
+    pd.testing.assert_frame_equal(outcomes_by_region(tmp_path, told.append, measure=True), frame)
+    assert len(told) == 2
+
+
+def test_what_was_played_stays_when_its_policy_is_gone(tmp_path: Path) -> None:
+    assert main([*RUN, "--seeds", "2", "--out", str(tmp_path)]) == 0
+    load_or_measure(tmp_path, PAIRS, print, measure_missing=True)
+    (tmp_path / "toy_reach" / "toy_search" / "default" / "seed-00" / POLICY_FILE).unlink()
+    assert main([*RUN, "--seeds", "3", "--out", str(tmp_path)]) == 0
+    table = load_or_measure(tmp_path, PAIRS, print, measure_missing=True)
+    assert table["seed"].value_counts().to_dict() == dict.fromkeys((0, 1, 2), INSTANCES)

@@ -79,8 +79,10 @@ def _around(results: Path, inside: pd.DataFrame, say: Callable[[str], None], mea
     for task, method, label, variant, cutout in inside[told].drop_duplicates().itertuples(index=False):
         try:
             table = load_or_measure(results, [(task, method)], say, measure, variant)
-        except UserError:
-            continue  # not measured, or a task without positions: the region then has no line
+        except UserError as error:
+            if measure:  # otherwise it is just not measured yet: the region then has no line
+                say(f"around the region, {task}/{method}/{variant} left out: {error}")
+            continue
         yield table.assign(label=label, variant=variant, cutout=cutout)
 
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from codesign_bench.errors import UserError
     from codesign_bench.method import load_method, method_names
-    from codesign_bench.policy_files import load_policy
-    from codesign_bench.results import load_results
+    from codesign_bench.storage.policies import load_policy
+    from codesign_bench.storage.results import load_results
     from codesign_bench.task import load_task, task_names
 
 __version__ = "0.1.0"
@@ -20,8 +20,8 @@ __version__ = "0.1.0"
 _HOMES = {
     "UserError": "errors",
     "load_method": "method",
-    "load_policy": "policy_files",
-    "load_results": "results",
+    "load_policy": "storage.policies",
+    "load_results": "storage.results",
     "load_task": "task",
     "method_names": "method",
     "task_names": "task",
@@ -49,4 +49,4 @@ def __dir__() -> list[str]:
     return sorted(__all__)
 
 
-import_module(f"{__name__}.envs").register_environments()
+import_module(f"{__name__}.task.envs").register_environments()

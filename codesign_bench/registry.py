@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import importlib
 import inspect
-import os
 import pkgutil
 from collections.abc import Callable
 from functools import lru_cache
@@ -15,7 +14,7 @@ from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
 from typing import Any
 
-from codesign_bench.errors import UserError, unknown_name
+from codesign_bench.errors import unknown_name
 
 IMPORTS_VARIABLE = "CODESIGN_BENCH_IMPORTS"
 """Environment variable through which `--import module` reaches the worker processes (module names, comma-separated)."""
@@ -26,24 +25,6 @@ _registered: dict[str, dict[str, Callable[[], Any]]] = {}
 def register(group: str, name: str, loader: Callable[[], Any]) -> None:
     """Add the entry `name` to `group` ("methods" or "tasks"); `loader` returns its class. For `--import`."""
     _registered.setdefault(group, {})[name] = loader
-
-
-def import_modules(modules: list[str]) -> None:
-    """Import `modules` here and in every process started from here, so that they can `register` their entries.
-
-    Raises:
-        UserError: a module cannot be found.
-    """
-    known = [name for name in os.environ.get(IMPORTS_VARIABLE, "").split(",") if name]
-    for name in known + [name for name in modules if name not in known]:
-        try:
-            importlib.import_module(name)
-        except ModuleNotFoundError as error:
-            if error.name is None or not name.startswith(error.name):
-                raise
-            raise UserError(f"--import: no module named '{name}'") from error
-        _register_classes(name)
-    os.environ[IMPORTS_VARIABLE] = ",".join(dict.fromkeys(known + modules))
 
 
 def names(group: str) -> tuple[str, ...]:
@@ -93,20 +74,6 @@ def single_subclass(module: ModuleType, base: type) -> Any:
     if len(found) != 1:
         raise TypeError(f"{module.__name__} must define one public {base.__name__}, not {len(found)}")
     return found[0]
-
-
-def _register_classes(module_name: str) -> None:
-    """Register the tasks and methods that an imported module defines, under the names that they give themselves."""
-    from codesign_bench.method import Method
-    from codesign_bench.task import Task
-
-    module = importlib.import_module(module_name)
-    for member in vars(module).values():
-        if not inspect.isclass(member) or inspect.isabstract(member) or member.__module__ != module.__name__:
-            continue
-        for group, base in (("tasks", Task), ("methods", Method)):
-            if issubclass(member, base):
-                register(group, member.name, lambda member=member: member)  # type: ignore[misc]
 
 
 @lru_cache

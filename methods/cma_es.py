@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from codesign_bench.episodes import portions
-from codesign_bench.learning.evolution import Evolution, EvolutionConfig, paper_evolution
+from codesign_bench.config.validation import check_range
+from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, paper_evolution
 from codesign_bench.learning.profiles import Tuned, tuned
-from codesign_bench.learning.ranges import check_range
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Booleans, Floats, Singles, Task
+from codesign_bench.task.episodes import portions
 
 PLAN = "plan"
 

@@ -16,17 +16,17 @@ import torch
 from torch import Tensor, nn
 
 from codesign_bench.learning.actor import Actor, ActorPolicy, load_module_arrays
-from codesign_bench.learning.evolution import Evolution, EvolutionConfig, paper_evolution
+from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, paper_evolution
+from codesign_bench.learning.features import Features
 from codesign_bench.learning.gae import episode_returns
 from codesign_bench.learning.networks import MLP, RunningNorm, torch_generator
-from codesign_bench.learning.observations import Features
 from codesign_bench.learning.ppo_config import PerceptronConfig
 from codesign_bench.learning.profiles import Tuned, paper_perceptrons, ppo_profile, tuned
 from codesign_bench.learning.two_phase import TwoPhaseLearner
-from codesign_bench.learning.values import MLPValue
+from codesign_bench.learning.value_networks import MLPValue
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
-from codesign_bench.paper_tables import CMA_RL
 from codesign_bench.seeding import Streams
+from codesign_bench.studies.corl2023.learners import CMA_RL
 from codesign_bench.task import Singles, Slots, Task
 
 

@@ -20,7 +20,7 @@ from codesign_bench.learning.graph_actor import GraphController
 from codesign_bench.learning.ppo_config import GraphConfig
 from codesign_bench.learning.ppo_method import PPOMethod
 from codesign_bench.learning.profiles import Tuned, paper_graph_networks, ppo_profile, tuned
-from codesign_bench.learning.values import GraphValue, ValueNetwork
+from codesign_bench.learning.value_networks import GraphValue, ValueNetwork
 from codesign_bench.task import Task
 
 

@@ -14,13 +14,13 @@ import numpy as np
 from torch import Tensor, nn
 
 from codesign_bench.learning.actor import Actor
+from codesign_bench.learning.features import Features
 from codesign_bench.learning.networks import MLP, RunningNorm, torch_generator
-from codesign_bench.learning.observations import Features
 from codesign_bench.learning.ppo_config import PerceptronConfig
 from codesign_bench.learning.ppo_method import PPOMethod
 from codesign_bench.learning.profiles import Tuned, paper_perceptrons, ppo_profile, sourced, tuned
-from codesign_bench.learning.values import MLPValue, ValueNetwork
-from codesign_bench.paper_tables import SHARED_ARCH
+from codesign_bench.learning.value_networks import MLPValue, ValueNetwork
+from codesign_bench.studies.corl2023.learners import SHARED_ARCH
 from codesign_bench.task import Task
 
 

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, MaxNLocator
 
-from codesign_bench.comparison import is_compared
 from codesign_bench.errors import UserError
-from codesign_bench.results import DEFAULT_VARIANT
+from codesign_bench.figures.comparison import is_compared
+from codesign_bench.storage.results import DEFAULT_VARIANT
 
 from ._order import task_order
 from ._style import BAND_OPACITY, COLUMN_WIDTH, PAGE_WIDTH, Dashes, in_order, line_styles, style

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import pandas as pd
 
-from codesign_bench.paper_tables import SCENES
+from codesign_bench.studies.corl2023.scenes import SCENES
 
 
 def task_order(tasks: Iterable[str]) -> list[str]:

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import matplotlib as mpl
 from matplotlib.axes import Axes
 
-from codesign_bench.comparison import is_compared, method_of
+from codesign_bench.figures.comparison import is_compared, method_of
 
 mpl.use("Agg")
 

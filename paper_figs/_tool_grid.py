@@ -12,7 +12,7 @@ NEEDED = (
     *("task", "title", "method", "label", "variant", "alpha", "seed", "instance", "success"),
     *("row", "column", "across", "up", "goal", "picture"),
 )
-"""Columns of a frame of tools, as `codesign_bench.designed_tools` makes it."""
+"""Columns of a frame of tools, as `codesign_bench.figures.designed_tools` makes it."""
 
 UNSOLVED_COLOUR, UNSOLVED_WIDTH = COLOURS["hwasp_minimal"], 1.5
 UNSOLVED_NOTE = "thick frame: the episode that followed did not succeed"

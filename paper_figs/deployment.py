@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from codesign_bench.errors import UserError
-from codesign_bench.paper_tables import REAL_ROBOT
+from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 from codesign_bench.text_tables import latex, markdown
 
 from ._order import task_order

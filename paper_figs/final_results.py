@@ -12,8 +12,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from codesign_bench.results import DEFAULT_VARIANT
 from codesign_bench.stats import CONFIDENCE, MIN_SEEDS, final_rng, final_values, mean_interval
+from codesign_bench.storage.results import DEFAULT_VARIANT
 from codesign_bench.text_tables import latex, markdown
 
 from ._curves import PANELS_PER_ROW, QUANTITIES, default_rows, method_labels

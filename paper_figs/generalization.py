@@ -43,7 +43,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the numbers of the right panels.
 
     Args:
-        frame: as `codesign_bench.generalization` makes it; fraction 0 is training on the whole region.
+        frame: as `codesign_bench.figures.generalization` makes it; fraction 0 is training on the whole region.
 
     Returns:
         Columns task, method, label, cutout, region, return_mean, standard_error (NaN for fewer than three seeds),

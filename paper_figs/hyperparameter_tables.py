@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from codesign_bench.errors import UserError
-from codesign_bench.paper_tables import LearnerTable
+from codesign_bench.studies.corl2023.learners import LearnerTable
 from codesign_bench.text_tables import latex, markdown
 
 from ._order import task_order

@@ -11,7 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from codesign_bench.errors import UserError
-from codesign_bench.results import DEFAULT_VARIANT
+from codesign_bench.storage.results import DEFAULT_VARIANT
 
 from ._order import in_task_order
 from ._style import COLUMN_WIDTH, PAGE_WIDTH, style
@@ -26,7 +26,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return what each picture shows.
 
     Args:
-        frame: as `codesign_bench.designed_tools` makes it; variants other than `default` are left out.
+        frame: as `codesign_bench.figures.designed_tools` makes it; variants other than `default` are left out.
 
     Returns:
         The same rows without pictures, the tasks in the paper's order; columns that no row fills are left out.

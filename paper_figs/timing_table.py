@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from codesign_bench.errors import UserError
-from codesign_bench.paper_tables import PROTOCOL, TIMINGS
+from codesign_bench.studies.corl2023.protocol import PROTOCOL, TIMINGS
 from codesign_bench.text_tables import latex, markdown
 
 from ._order import task_order

@@ -40,8 +40,8 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the numbers that the figure shows.
 
     Args:
-        frame: rows as `codesign_bench.results.load_evaluations` gives them; variants other than `alpha-...` are left
-            out. The ratio of a seed is its mean material over its mean effort (NaN where nothing moved).
+        frame: rows as `codesign_bench.storage.results.load_evaluations` gives them; variants other than `alpha-...`
+            are left out. The ratio of a seed is its mean material over its mean effort (NaN where nothing moved).
 
     Returns:
         Columns task, method, label, quantity ("ratio", "material" or "effort"), alpha, mean, standard_error (NaN for

@@ -26,7 +26,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return what each picture shows.
 
     Args:
-        frame: as `codesign_bench.designed_tools` makes it; variants other than `alpha-...` are left out.
+        frame: as `codesign_bench.figures.designed_tools` makes it; variants other than `alpha-...` are left out.
 
     Returns:
         The rows drawn, without pictures, by task and alpha; columns that no row fills are left out.

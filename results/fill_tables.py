@@ -15,9 +15,9 @@ from pathlib import Path
 
 import codesign_bench as cb
 from codesign_bench.claims.evidence import Measure, load_evidence
-from codesign_bench.claims.paper import CLAIMS, OUTSIDE
 from codesign_bench.claims.verify import Row, by_rule, contradicted, judge
 from codesign_bench.registry import load_module
+from codesign_bench.studies.corl2023.claims import CLAIMS, OUTSIDE
 
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "results" / "reference"

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from codesign_bench.errors import UserError
-from codesign_bench.experiments import OURS
-from codesign_bench.results import (
+from codesign_bench.storage.results import (
     CELL_FILE,
     CURVE_FILE,
     DEFAULT_VARIANT,
@@ -26,6 +25,7 @@ from codesign_bench.results import (
     find_cells,
     open_folder,
 )
+from codesign_bench.studies.corl2023.experiments import OURS
 
 REFERENCE = Path(__file__).resolve().parent / "reference"
 """Where cells go unless told otherwise."""

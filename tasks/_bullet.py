@@ -16,8 +16,8 @@ from typing import ClassVar
 import numpy as np
 from PIL import Image, ImageDraw
 
-from codesign_bench.deployment.robot import ArmReport, DeployedSimulator
 from codesign_bench.task import BoxPart, Floats, Frame, Physics, Slots
+from codesign_bench.task.robot import ArmReport, DeployedSimulator
 
 from ._carriers import LEVEL, Carrier, Gantry, HeldTool, ToolShape, pybullet, run
 from ._scene import COLOURS, PICTURE_PIXELS, Clock

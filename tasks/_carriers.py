@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from codesign_bench.deployment.robot import ArmReport
 from codesign_bench.errors import UserError
+from codesign_bench.task.robot import ArmReport
 
 try:
     import pybullet as pybullet

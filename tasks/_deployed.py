@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from codesign_bench.deployment.robot import ARMS, IDEAL
 from codesign_bench.errors import unknown_name
 from codesign_bench.task import ToolPart
+from codesign_bench.task.robot import ARMS, IDEAL
 
 from ._carriers import Carrier
 from ._scene import Clock

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from codesign_bench.deployment.robot import DeployedSimulator, RobotTrials
-from codesign_bench.paper_tables import BOX_SCENES, PROTOCOL, REAL_ROBOT
+from codesign_bench.studies.corl2023.protocol import PROTOCOL
+from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
+from codesign_bench.studies.corl2023.scenes import BOX_SCENES
 from codesign_bench.task import (
     Behaviour,
     Booleans,
@@ -23,6 +24,7 @@ from codesign_bench.task import (
     ToolGraph,
     ToolPart,
 )
+from codesign_bench.task.robot import DeployedSimulator, RobotTrials
 
 from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, box_parts, rotations_about
 from ._carriers import Carrier

@@ -10,8 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from codesign_bench.deployment.robot import DeployedSimulator, RobotTrials
-from codesign_bench.paper_tables import BOX_SCENES, REAL_ROBOT
+from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
+from codesign_bench.studies.corl2023.scenes import BOX_SCENES
 from codesign_bench.task import (
     Behaviour,
     Booleans,
@@ -26,6 +26,7 @@ from codesign_bench.task import (
     ToolGraph,
     ToolPart,
 )
+from codesign_bench.task.robot import DeployedSimulator, RobotTrials
 
 from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, box_parts, rotation_matrices, rotations_about
 from ._carriers import Carrier

@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 import pymunk
 
-from codesign_bench.paper_tables import PLANAR_SCENES
+from codesign_bench.studies.corl2023.scenes import PLANAR_SCENES
 from codesign_bench.task import (
     Behaviour,
     Booleans,

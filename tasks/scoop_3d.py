@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 import pybullet
 
-from codesign_bench.paper_tables import BOX_SCENES
+from codesign_bench.studies.corl2023.scenes import BOX_SCENES
 from codesign_bench.task import (
     Behaviour,
     Booleans,

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from codesign_bench import registry
-from codesign_bench.training import CHECKPOINT_SECONDS_VARIABLE
+from codesign_bench import plugins, registry
+from codesign_bench.sweep.training import CHECKPOINT_SECONDS_VARIABLE
 
 TESTS = Path(__file__).parent
 
@@ -19,7 +19,7 @@ def toy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(TESTS))
     monkeypatch.setenv(registry.IMPORTS_VARIABLE, "")
     monkeypatch.setattr(registry, "_registered", {})
-    registry.import_modules(["toy"])
+    plugins.import_modules(["toy"])
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import configparser
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -66,11 +67,11 @@ def test_the_core_knows_no_method_task_or_figure() -> None:
 
 
 def test_methods_know_no_task_and_no_figure() -> None:
-    assert offences(files("methods"), below("tasks", "paper_figs", "runner", "results", "cli")) == []
+    assert offences(files("methods"), below("tasks", "paper_figs", "sweep", "storage", "cli")) == []
 
 
 def test_tasks_know_no_method_and_nothing_of_learning() -> None:
-    forbidden = (*below("methods", "paper_figs", "learning", "method", "runner", "results", "cli"), "torch", "cma")
+    forbidden = (*below("methods", "paper_figs", "learning", "method", "sweep", "storage", "cli"), "torch", "cma")
     assert offences(files("tasks"), forbidden) == []
 
 
@@ -78,12 +79,12 @@ def test_figures_are_drawn_from_results_alone() -> None:
     allowed = {"codesign_bench", "numpy", "pandas", "matplotlib", "scipy", *sys.stdlib_module_names}
     modules = {module for path in files("paper_figs") for module in imported(path)}
     assert {module.split(".")[0] for module in modules} <= allowed
-    assert offences(files("paper_figs"), below("methods", "tasks", "method", "task", "learning", "runner")) == []
+    assert offences(files("paper_figs"), below("methods", "tasks", "method", "task", "learning", "sweep")) == []
 
 
 def test_what_is_shared_by_methods_knows_neither_results_nor_running() -> None:
     shared = sorted(LEARNING.rglob("*.py"))
-    assert offences(shared, below("runner", "results", "cli", "checkpoint", "evaluate", "progress")) == []
+    assert offences(shared, below("sweep", "storage", "cli", "evaluation")) == []
 
 
 @pytest.mark.parametrize("folder", FLAT_FOLDERS)
@@ -107,9 +108,36 @@ def test_the_listed_packages_are_the_folders_on_disk() -> None:
     assert mapped == {f"codesign_bench.{folder}": folder for folder in FLAT_FOLDERS}
 
 
-def test_the_command_line_starts_without_heavy_imports() -> None:
-    light = ("registry", "errors", "task", "episodes", "method", "envs", "seeding", "__init__")
-    heavy = {"torch", "pybullet", "pymunk", "cma"}
-    for name in light:
-        top = {module.split(".")[0] for module in imported(ROOT / "codesign_bench" / f"{name}.py", nodes="top")}
-        assert not top & heavy, name
+def reached(module: str, edges: dict[str, set[str]]) -> set[str]:
+    """Return the modules that importing `module` imports in the end."""
+    found, left = set(), [module]
+    while left:
+        for other in edges.get(left.pop(), ()):
+            if other not in found:
+                found.add(other)
+                left.append(other)
+    return found
+
+
+def name_of(path: Path) -> str:
+    """Return the dotted name of a file once installed."""
+    return package_of(path) if path.name == "__init__.py" else f"{package_of(path)}.{path.stem}"
+
+
+def imports_between(paths: list[Path], nodes: str = "all") -> dict[str, set[str]]:
+    """Return module -> modules among `paths` that it imports, the packages around these included."""
+    known = {name_of(path) for path in paths}
+    return {name_of(path): {module for module in imported(path, nodes) if module in known} for path in paths}
+
+
+def test_no_module_of_the_core_imports_itself_in_a_circle() -> None:
+    edges = imports_between(CORE)
+    assert sorted(module for module in edges if module in reached(module, edges)) == []
+
+
+@pytest.mark.parametrize("heavy", ["torch", "pybullet", "pymunk", "cma", "pandas"])
+def test_listing_and_helping_import_nothing_heavy(heavy: str) -> None:
+    call = "import sys; from codesign_bench.cli import main; main(['list']); main(['--help']); "
+    line = f"{call}print({heavy!r} in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "False"

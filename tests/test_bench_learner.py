@@ -11,15 +11,8 @@ import numpy as np
 import pytest
 
 from codesign_bench.benchmarks import learner
-from codesign_bench.benchmarks.learner import (
-    HEADER,
-    Speed,
-    Workload,
-    contestants,
-    operations_per_sample,
-    ours,
-    together,
-)
+from codesign_bench.benchmarks.learner import HEADER, contestants, operations_per_sample, ours
+from codesign_bench.benchmarks.workload import Speed, Workload, together
 from codesign_bench.cli import main
 
 SMALL = ["--batch-size", "320", "--minibatch-size", "100", "--epochs", "2", "--repeats", "1"]

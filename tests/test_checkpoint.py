@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codesign_bench.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
 from codesign_bench.errors import UserError
 from codesign_bench.method import State
 from codesign_bench.seeding import Streams
+from codesign_bench.storage.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
 
 
 def example() -> Checkpoint:

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from codesign_bench import cli, method_names, task_names
+from codesign_bench import method_names, task_names
 from codesign_bench.cli import main
+from codesign_bench.cli.program import build_parser
+from codesign_bench.cli.run import overrides
 from codesign_bench.registry import names
 
 pytestmark = pytest.mark.usefixtures("toy")
@@ -162,6 +164,6 @@ def test_python_dash_m_is_the_same_program() -> None:
 def test_device_and_precision_are_part_of_the_configuration(
     monkeypatch: pytest.MonkeyPatch, arguments: list[str], has_bfloat16: bool, expected: list[str]
 ) -> None:
-    monkeypatch.setattr("codesign_bench.host.computes_in_bfloat16", lambda: has_bfloat16)
-    options = cli.build_parser().parse_args(["run", "--task", "push", *arguments])
-    assert cli._overrides(options) == expected
+    monkeypatch.setattr("codesign_bench.machine.computes_in_bfloat16", lambda: has_bfloat16)
+    options = build_parser().parse_args(["run", "--task", "push", *arguments])
+    assert overrides(options) == expected

@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 from codesign_bench.cli import main
-from codesign_bench.comparison import with_compared
+from codesign_bench.figures.comparison import with_compared
 from codesign_bench.registry import load_module
-from codesign_bench.results import load_results
+from codesign_bench.storage.results import load_results
 
 REFERENCE = Path(__file__).resolve().parent.parent / "results" / "reference"
 

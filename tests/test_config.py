@@ -6,10 +6,11 @@ from typing import Any, Literal
 
 import pytest
 
-from codesign_bench.config import check_overrides, differences, method_config, parse_value, resolve
+from codesign_bench.config.profiles import PROFILES
+from codesign_bench.config.resolve import check_overrides, differences, method_config, resolve
+from codesign_bench.config.values import parse_value
 from codesign_bench.errors import UserError
 from codesign_bench.method import Method, load_method
-from codesign_bench.profiles import PROFILES
 
 pytestmark = pytest.mark.usefixtures("toy")
 
@@ -125,8 +126,8 @@ def test_a_value_that_is_newer_than_a_stored_configuration_counts_as_its_default
 
 
 def test_every_method_resolves_on_every_profile_and_on_a_task_it_has_never_heard_of() -> None:
+    from codesign_bench.config.profiles import PROFILES
     from codesign_bench.method import method_names
-    from codesign_bench.profiles import PROFILES
 
     for name in method_names():
         for profile in PROFILES:

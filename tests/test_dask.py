@@ -15,11 +15,11 @@ import pytest
 from rich.console import Console
 
 from codesign_bench import load_results
-from codesign_bench.cell import Cell, grid
+from codesign_bench.cell.cell import Cell, grid
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
-from codesign_bench.results import PROGRESS_FILE
-from codesign_bench.runner import run_sweep
+from codesign_bench.storage.results import PROGRESS_FILE
+from codesign_bench.sweep.runner import run_sweep
 
 distributed: Any = pytest.importorskip("distributed")
 
@@ -90,7 +90,7 @@ def test_without_a_scheduler_a_cluster_starts_and_ends_with_the_sweep(tmp_path: 
 def test_a_scheduler_that_does_not_answer_gets_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("codesign_bench.backends.CONNECT_SECONDS", 0.5)
+    monkeypatch.setattr("codesign_bench.sweep.backends.CONNECT_SECONDS", 0.5)
     with pytest.raises(UserError, match="no Dask scheduler answers"):
         sweep(cells()[:1], tmp_path, backend="dask", scheduler="tcp://127.0.0.1:9")
     arguments = ["--method", "toy_search", "--task", "toy_reach", "--import", "toy", "--out", str(tmp_path)]

@@ -17,16 +17,16 @@ from codesign_bench.cli import main
 from codesign_bench.deployment.conditions import TRIAL, Conditions, Physics
 from codesign_bench.deployment.deploy import Order, deploy
 from codesign_bench.deployment.protocol import grid_trials, own_trials
-from codesign_bench.deployment.robot import IDEAL, PANDA
 from codesign_bench.deployment.rollout import Deployment
 from codesign_bench.deployment.tables import load_deployment, row, summarise
-from codesign_bench.episodes import Episodes
 from codesign_bench.errors import UserError
-from codesign_bench.evaluate import evaluate
-from codesign_bench.paper_tables import REAL_ROBOT
-from codesign_bench.policy_files import policy_and_task
+from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.seeding import generator
+from codesign_bench.storage.policies import policy_and_task
+from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 from codesign_bench.task import Behaviour, Floats, Singles
+from codesign_bench.task.episodes import Episodes
+from codesign_bench.task.robot import IDEAL, PANDA
 
 REFERENCE = Path(__file__).resolve().parent.parent / "results" / "reference"
 TASKS = ("fetch_cube", "lift_cup")

@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from codesign_bench.designed_tools import LINE_LENGTH, Place, designed_tools, spread
-from codesign_bench.episodes import Episodes
 from codesign_bench.errors import UserError
-from codesign_bench.plotting import draw_figures
-from codesign_bench.policy_files import load_policy
+from codesign_bench.figures.designed_tools import LINE_LENGTH, Place, designed_tools, spread
+from codesign_bench.figures.drawing import draw_figures
+from codesign_bench.storage.policies import load_policy
 from codesign_bench.task import load_task
+from codesign_bench.task.episodes import Episodes
 
 REFERENCE = Path(__file__).resolve().parent.parent / "results" / "reference"
 CELL = Path("push", "gnn_ppo", "default", "seed-00")

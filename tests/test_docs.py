@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import codesign_bench
-from codesign_bench.config import resolve
+from codesign_bench.config.resolve import resolve
 from codesign_bench.method import Problem, load_method, method_names
 from codesign_bench.seeding import Streams
 from codesign_bench.task import load_task, task_names

@@ -13,8 +13,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
-from codesign_bench.envs import ToolEnv, environment_id, register_environments
 from codesign_bench.task import load_task, task_names
+from codesign_bench.task.envs import ToolEnv, environment_id, register_environments
 
 register_environments()
 EVERY_TASK = pytest.mark.parametrize("task_name", task_names())
@@ -143,7 +143,7 @@ def test_values_that_are_not_finite_are_refused(task_name: str) -> None:
 
 def test_listing_environments_loads_neither_torch_nor_simulators() -> None:
     code = (
-        "import sys, gymnasium, codesign_bench.envs as envs; envs.register_environments();"
+        "import sys, gymnasium, codesign_bench.task.envs as envs; envs.register_environments();"
         "assert any(name.startswith('codesign_bench/') for name in gymnasium.registry);"
         "loaded = {name.split('.')[0] for name in sys.modules};"
         "sys.exit(str(loaded & {'torch', 'pybullet', 'pymunk'}) if loaded & {'torch', 'pybullet', 'pymunk'} else 0)"

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codesign_bench.episodes import Tradeoff, portions
-from codesign_bench.evaluate import evaluate, rows
+from codesign_bench.evaluation.evaluate import evaluate, rows
 from codesign_bench.task import Task, load_task
+from codesign_bench.task.episodes import Tradeoff, portions
 
 pytestmark = pytest.mark.usefixtures("toy")
 

@@ -12,13 +12,13 @@ import pytest
 from rich.console import Console
 
 from codesign_bench import load_policy, load_results
-from codesign_bench.cell import Cell, check_cells, grid
+from codesign_bench.cell.cell import Cell, check_cells, grid
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
 from codesign_bench.method import Method, Problem, load_method, method_names
-from codesign_bench.results import read_cell
-from codesign_bench.runner import run_sweep
 from codesign_bench.seeding import Streams
+from codesign_bench.storage.results import read_cell
+from codesign_bench.sweep.runner import run_sweep
 from codesign_bench.task import load_task
 
 pytestmark = pytest.mark.usefixtures("toy")
@@ -65,7 +65,7 @@ def test_fine_tuning_starts_where_training_ended_and_scratch_does_not(trained: P
         problem = cell.problem(cell.config())
         assert problem.evaluation_instances().tolist() == [goal[(cell.start or 0) - 1].tolist()]
         if cell.finetune is not None:
-            from codesign_bench.evaluate import evaluate
+            from codesign_bench.evaluation.evaluate import evaluate
 
             start = evaluate(problem.task, policy, instances=problem.evaluation_instances())
             assert curve["return_mean"].iloc[0] == pytest.approx(start.returns[0])

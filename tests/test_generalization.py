@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from codesign_bench.errors import UserError
-from codesign_bench.generalization import outcomes_by_region, regions
-from codesign_bench.results import write_cell
+from codesign_bench.figures.generalization import outcomes_by_region, regions
+from codesign_bench.storage.results import write_cell
 from codesign_bench.task import load_task
 
 

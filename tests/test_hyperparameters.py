@@ -9,12 +9,13 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from codesign_bench.config import resolve
+from codesign_bench.config.resolve import resolve
 from codesign_bench.errors import UserError
-from codesign_bench.hyperparameters import SCENE, as_text, hyperparameters
+from codesign_bench.figures.drawing import draw_figures
 from codesign_bench.method import load_method
-from codesign_bench.paper_tables import LEARNERS, SCENES
-from codesign_bench.plotting import draw_figures
+from codesign_bench.studies.corl2023.hyperparameters import SCENE, as_text, hyperparameters
+from codesign_bench.studies.corl2023.learners import LEARNERS
+from codesign_bench.studies.corl2023.scenes import SCENES
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ import pytest
 
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
-from codesign_bench.generalization import OUTSIDE, START, outcomes_by_region
-from codesign_bench.outside import INSTANCES, RIM, load_or_measure, outside_instances
-from codesign_bench.results import POLICY_FILE
+from codesign_bench.evaluation.extrapolation import INSTANCES, RIM, load_or_measure, outside_instances
+from codesign_bench.figures.generalization import OUTSIDE, START, outcomes_by_region
+from codesign_bench.storage.results import POLICY_FILE
 from codesign_bench.task import load_task
 
 pytestmark = pytest.mark.usefixtures("toy")

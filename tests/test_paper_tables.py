@@ -1,4 +1,4 @@
-"""The numbers in `paper_tables` are those printed in the paper's LaTeX, and none is missing on either side.
+"""The numbers of the study `corl2023` are those printed in the paper's LaTeX, and none is missing on either side.
 
 `data/paper_tables.csv` holds the rows as printed, cut out of the LaTeX source by label.
 """
@@ -15,8 +15,9 @@ from typing import Any
 
 import pytest
 
-from codesign_bench import paper_tables
-from codesign_bench.paper_tables import CMA_ES_SWEEP, LEARNERS, PROTOCOL, SCENES, TIMINGS, Swept
+from codesign_bench.studies.corl2023.learners import CMA_ES_SWEEP, CMA_RL, LEARNERS, SHARED_ARCH, Swept
+from codesign_bench.studies.corl2023.protocol import PROTOCOL, TIMINGS
+from codesign_bench.studies.corl2023.scenes import SCENES
 
 Key = tuple[str, str]
 
@@ -75,7 +76,7 @@ def baseline_rows() -> Iterator[tuple[Key, Any]]:
     """Yield what the module says for each row of the baselines' table."""
     for field in dataclasses.fields(CMA_ES_SWEEP):
         yield ("table:baseline_hp", f"CMA-ES: {printed(field.name)}"), getattr(CMA_ES_SWEEP, field.name)
-    for name, table in {"CMA-RL": paper_tables.CMA_RL, "Ours(shared arch.)": paper_tables.SHARED_ARCH}.items():
+    for name, table in {"CMA-RL": CMA_RL, "Ours(shared arch.)": SHARED_ARCH}.items():
         values = dataclasses.asdict(table)
         values["batch_size"] = (values["batch_size"], values.pop("batch_size_scoop_3d"))
         for field_name, value in values.items():
@@ -146,7 +147,7 @@ def test_scenes_and_learners_speak_of_the_same_tasks() -> None:
 
 
 def test_scoop_3d_has_its_own_batch_size_and_seeds() -> None:
-    assert paper_tables.CMA_RL.batch_size_for("scoop_3d") == 20000
-    assert paper_tables.CMA_RL.batch_size_for("push") == 50000
+    assert CMA_RL.batch_size_for("scoop_3d") == 20000
+    assert CMA_RL.batch_size_for("push") == 50000
     assert PROTOCOL.seeds_for("scoop_3d") == 3
     assert PROTOCOL.seeds_for("push") == 6

@@ -13,11 +13,11 @@ import pytest
 
 import codesign_bench as cb
 from codesign_bench.cli import main
-from codesign_bench.config import differences, resolve
-from codesign_bench.evaluate import evaluate
+from codesign_bench.config.resolve import differences, resolve
+from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.method import load_method
 from codesign_bench.registry import load_module
-from codesign_bench.results import read_cell
+from codesign_bench.storage.results import read_cell
 
 REFERENCE = Path(__file__).resolve().parent.parent / "results" / "reference"
 METHODS: tuple[str, ...] = import_module("codesign_bench.methods").ORDER

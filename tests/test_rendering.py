@@ -10,7 +10,7 @@ from PIL import Image
 
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
-from codesign_bench.rendering import CAPTION_PIXELS, FRAMES_PER_SECOND, MOMENTS, RandomBehaviour, render
+from codesign_bench.evaluation.rendering import CAPTION_PIXELS, FRAMES_PER_SECOND, MOMENTS, RandomBehaviour, render
 from codesign_bench.task import load_task
 
 TRAINED = Path(__file__).resolve().parent.parent / "results" / "reference" / "push" / "gnn_ppo" / "default" / "seed-00"
@@ -74,7 +74,7 @@ def test_a_trained_policy_knows_its_task(tmp_path: Path, capsys: pytest.CaptureF
     [
         (["--task", "push", "--out", "push.jpg"], "pictures end in .gif or .png"),
         (["--task", "pusch", "--out", "push.png"], "unknown task 'pusch'; choose from: push"),
-        (["--out", "push.png"], "name a --task, or a --policy"),
+        (["--out", "push.png"], "give --task, or --policy"),
         (["--policy", "x", "--behaviour", "random", "--out", "push.png"], "either --policy or --behaviour"),
         (["--task", "push", "--episodes", "0", "--out", "push.png"], "--episodes must be at least 1"),
         (["--policy", "nowhere", "--out", "push.png"], "is no cell's folder"),
@@ -91,7 +91,7 @@ def test_bad_input_gets_one_line(capsys: pytest.CaptureFixture[str], arguments: 
 @pytest.mark.parametrize("command", [["render", "--out", "push.png"], ["deploy", "--policy", "x"]])
 def test_a_seed_below_zero_is_refused(capsys: pytest.CaptureFixture[str], command: list[str]) -> None:
     assert main([*command, "--seed", "-1"]) == 2
-    assert "argument --seed: a seed is at least 0, not -1" in capsys.readouterr().err
+    assert "argument --seed: a seed must be at least 0, not -1" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("toy")

@@ -15,7 +15,8 @@ import pandas as pd
 import pytest
 
 import codesign_bench
-from codesign_bench.claims.claim import Claim, Finding, Rule
+from codesign_bench.claims.claim import Claim, Rule
+from codesign_bench.claims.finding import Finding
 from codesign_bench.claims.verify import Row
 from codesign_bench.cli import main
 from codesign_bench.report.cells import read_cells
@@ -23,8 +24,8 @@ from codesign_bench.report.claims import part
 from codesign_bench.report.final_values import STRIP_MARGIN, STRIP_WIDTH, estimate, strip, task_results, verdict
 from codesign_bench.report.page import code_spans, write_report
 from codesign_bench.report.provenance import code_version, configurations, version_table
-from codesign_bench.results import CURVE_COLUMNS, cell_lock, load_results, write_cell, write_rows
 from codesign_bench.seeding import generator
+from codesign_bench.storage.results import CURVE_COLUMNS, cell_lock, load_results, write_cell, write_rows
 
 ATTACK = "<script>alert('x')</script><img src=http://example.com/x onerror=alert(1)>"
 TASK, METHOD = "reach", "gnn_ppo"

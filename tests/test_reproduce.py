@@ -12,14 +12,15 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
-from codesign_bench import baseline_sweep, experiments
-from codesign_bench.baseline_sweep import KEYS, Plan, load_sweep, settings_of, sweep_baseline
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
-from codesign_bench.experiments import EXPERIMENTS, Experiment, Grid, experiments_named, stages_of
-from codesign_bench.paper_tables import CMA_ES_SWEEP, PROTOCOL
 from codesign_bench.registry import names
-from codesign_bench.reproduce import reproduce
+from codesign_bench.studies.corl2023 import baseline_sweep, experiments
+from codesign_bench.studies.corl2023.baseline_sweep import KEYS, Plan, load_sweep, settings_of, sweep_baseline
+from codesign_bench.studies.corl2023.experiments import EXPERIMENTS, Experiment, Grid, experiments_named, stages_of
+from codesign_bench.studies.corl2023.learners import CMA_ES_SWEEP
+from codesign_bench.studies.corl2023.protocol import PROTOCOL
+from codesign_bench.study.reproduce import reproduce
 from codesign_bench.task import load_task, task_names
 
 REFERENCE = Path(__file__).resolve().parent.parent / "results" / "reference"

@@ -10,9 +10,9 @@ import pytest
 from rich.console import Console
 
 from codesign_bench import load_policy, load_results
-from codesign_bench.cell import grid
+from codesign_bench.cell.cell import grid
 from codesign_bench.errors import UserError
-from codesign_bench.results import (
+from codesign_bench.storage.results import (
     CURVE_COLUMNS,
     MARKER_FILE,
     cell_lock,
@@ -129,8 +129,8 @@ def test_a_cell_without_a_policy_says_so(tmp_path: Path, status: str, named: str
 
 @pytest.mark.usefixtures("toy")
 def test_evaluations_hold_every_instance_of_every_finished_cell(tmp_path: Path) -> None:
-    from codesign_bench.results import load_evaluations
-    from codesign_bench.runner import run_sweep
+    from codesign_bench.storage.results import load_evaluations
+    from codesign_bench.sweep.runner import run_sweep
 
     cells = list(grid(tasks=["toy_reach"], methods=["toy_search"], seeds=range(2), cutouts=[0.5], steps=100))
     run_sweep(cells, tmp_path, console=Console(quiet=True))

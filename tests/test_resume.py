@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 from codesign_bench import load_results
-from codesign_bench.results import CHECKPOINT_FILE, is_locked, read_cell
+from codesign_bench.storage.results import CHECKPOINT_FILE, is_locked, read_cell
 
 pytestmark = pytest.mark.usefixtures("toy", "every_batch")
 

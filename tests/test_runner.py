@@ -12,12 +12,13 @@ import pytest
 from rich.console import Console
 
 from codesign_bench import load_policy, load_results
-from codesign_bench.cell import Cell, check_cells, grid, parse_seeds
+from codesign_bench.cell.cell import Cell, check_cells, grid, parse_seeds
+from codesign_bench.console import duration
 from codesign_bench.errors import UserError
-from codesign_bench.files import write_json
-from codesign_bench.progress import ProgressDisplay, duration
-from codesign_bench.results import CHECKPOINT_FILE, PROGRESS_FILE, open_folder, read_cell
-from codesign_bench.runner import make_plan, run_sweep, split_cores
+from codesign_bench.storage.files import write_json
+from codesign_bench.storage.results import CHECKPOINT_FILE, PROGRESS_FILE, open_folder, read_cell
+from codesign_bench.sweep.progress import ProgressDisplay
+from codesign_bench.sweep.runner import make_plan, run_sweep, split_cores
 
 pytestmark = pytest.mark.usefixtures("toy")
 

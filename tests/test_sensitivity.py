@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codesign_bench import sensitivity
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
-from codesign_bench.evaluate import evaluate
-from codesign_bench.plotting import draw_figures
-from codesign_bench.sensitivity import COLUMNS, GivenTools, load_or_measure, measure, tools_of
+from codesign_bench.evaluation import sensitivity
+from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.evaluation.sensitivity import COLUMNS, GivenTools, load_or_measure, measure, tools_of
+from codesign_bench.figures.drawing import draw_figures
 from codesign_bench.task import load_task
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import codesign_bench as cb
-from codesign_bench.results import CHECKPOINT_FILE, DONE, LOG_FILE, RUNNING, read_cell, write_cell
+from codesign_bench.storage.results import CHECKPOINT_FILE, DONE, LOG_FILE, RUNNING, read_cell, write_cell
 
 RESULTS = Path(__file__).resolve().parent.parent / "results"
 SCRIPT = RESULTS / "ship_cells.py"

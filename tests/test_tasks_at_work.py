@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 
 from codesign_bench.errors import UserError
-from codesign_bench.plotting import draw_figures
-from codesign_bench.results import write_cell
+from codesign_bench.figures.drawing import draw_figures
+from codesign_bench.figures.task_pictures import tasks_at_work
+from codesign_bench.storage.results import write_cell
 from codesign_bench.task import load_task
-from codesign_bench.tasks_at_work import tasks_at_work
 
 
 def test_the_picture_is_of_a_moment_after_the_start_and_before_the_end() -> None:

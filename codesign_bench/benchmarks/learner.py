@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
-import resource
 import subprocess
 import sys
 import time
@@ -24,48 +22,16 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from codesign_bench.config import resolve
+from codesign_bench.benchmarks.workload import Speed, Workload, peak_megabytes, together
+from codesign_bench.config.resolve import resolve
+from codesign_bench.console import print_table
 from codesign_bench.errors import UserError
-from codesign_bench.files import write_json
-from codesign_bench.host import available_cores, computes_in_bfloat16, host_facts, package_versions, thread_environment
+from codesign_bench.machine import available_cores, computes_in_bfloat16, host_facts, package_versions
 from codesign_bench.method import Problem, load_method
-from codesign_bench.progress import print_table
+from codesign_bench.processes import thread_environment
 from codesign_bench.seeding import Streams
+from codesign_bench.storage.files import write_json
 from codesign_bench.task import load_task
-
-
-@dataclass(frozen=True)
-class Workload:
-    """What every contestant does."""
-
-    task: str = "push"
-    batch_size: int = 50_000
-    minibatch_size: int = 2_000
-    epochs: int = 10
-    cores: int = 1
-    cells: int = 1
-    """Processes that do the same at once, each on `cores` cores: the sweep's case."""
-    repeats: int = 3
-    environments: int = 50
-    """Of stable-baselines3; ours follow from the batch."""
-
-
-@dataclass(frozen=True)
-class Speed:
-    """What one contestant reached, as medians over the repeats."""
-
-    rollout: float
-    """Environment steps per second of rollouts, the policy in the loop."""
-    update: float
-    """Samples per second that pass through the update, forward and backward, policy and value."""
-    peak_megabytes: float
-    gigaflops: float | None = None
-    """Useful floating-point operations per second of the update, 1e9; None: not counted."""
-    how: str = ""
-
-    def end_to_end(self, epochs: int) -> float:
-        """Return environment steps per second of rollout and update together."""
-        return 1.0 / (1.0 / self.rollout + epochs / self.update)
 
 
 @dataclass(frozen=True)
@@ -260,31 +226,6 @@ def _in_process(name: str, work: Workload) -> Speed:
             raise RuntimeError(f"measuring {name} failed:\n{errors}")
         speeds.append(Speed(**json.loads(output.splitlines()[-1])))
     return together(speeds)
-
-
-def together(speeds: Sequence[Speed]) -> Speed:
-    """Return what cells that ran side by side reached in all; the memory is the largest cell's."""
-    counted = [speed.gigaflops for speed in speeds if speed.gigaflops is not None]
-    return Speed(
-        rollout=sum(speed.rollout for speed in speeds),
-        update=sum(speed.update for speed in speeds),
-        peak_megabytes=max(speed.peak_megabytes for speed in speeds),
-        gigaflops=sum(counted) if counted else None,
-        how=speeds[0].how,
-    )
-
-
-def peak_megabytes() -> float:
-    """Return the most memory that this process and the largest of its ended children ever held.
-
-    The kernel's maximum in `getrusage` outlives `exec`: it may be that of the process that started this one. Where
-    /proc tells of this program alone, that is taken.
-    """
-    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    status = Path("/proc/self/status")
-    if status.exists():
-        own = int(re.search(r"^VmHWM:\s+(\d+) kB", status.read_text(), re.MULTILINE)[1])  # type: ignore[index]
-    return (own + resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) / 1024.0
 
 
 def _main(name: str, work_json: str) -> None:

@@ -12,11 +12,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from codesign_bench.benchmarks.learner import Speed, Workload, peak_megabytes
-from codesign_bench.envs import ToolVectorEnv, environment_id, register_environments
-from codesign_bench.episodes import Episodes
-from codesign_bench.paper_tables import CMA_RL, LEARNERS
+from codesign_bench.benchmarks.workload import Speed, Workload, peak_megabytes
+from codesign_bench.studies.corl2023.learners import CMA_RL, LEARNERS
 from codesign_bench.task import Task, load_task
+from codesign_bench.task.envs import ToolVectorEnv, environment_id, register_environments
+from codesign_bench.task.episodes import Episodes
 
 WIDTHS = list(CMA_RL.policy_net)
 """The perceptrons of the paper's baselines: five layers of 256."""

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from codesign_bench.episodes import Episodes
+from codesign_bench.console import print_table
 from codesign_bench.errors import UserError
-from codesign_bench.progress import print_table
 from codesign_bench.seeding import generator
 from codesign_bench.task import load_task
+from codesign_bench.task.episodes import Episodes
 
 SLOTS = 64
 HELD_STEPS = 10

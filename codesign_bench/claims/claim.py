@@ -1,41 +1,14 @@
-"""What a claim is, the rule that judges it, and what the rule finds."""
+"""What a claim is, and the rule that judges it."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from codesign_bench.claims.evidence import Evidence
-
-SUPPORTED, CONTRADICTED, UNDECIDED = "supported", "contradicted", "undecided"
-VERDICTS = (SUPPORTED, CONTRADICTED, UNDECIDED)
-
-
-class Lacking(Exception):
-    """The results do not hold what a rule needs; the message says what is lacking."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A claim's statistic and what follows from it."""
-
-    verdict: str
-    """One of `VERDICTS`."""
-    value: float
-    """The statistic over all seeds; NaN where there is none."""
-    low: float = math.nan
-    """Lower end of its 95 % bootstrap interval over seeds; NaN where there is none."""
-    high: float = math.nan
-    """Upper end."""
-    n: str = ""
-    """What was counted, e.g. "6 and 6 seeds"."""
-    note: str = ""
-    """Why it is undecided, or what the number hides."""
+from codesign_bench.claims.evidence import Evidence
+from codesign_bench.claims.finding import Finding
 
 
 @dataclass(frozen=True)
@@ -65,15 +38,3 @@ class Claim:
     source: str
     """The paper's section, figure or table."""
     rule: Rule
-
-
-def above(low: float, high: float, threshold: float) -> str:
-    """Return the verdict on "the statistic lies above `threshold`": undecided where the interval holds or lacks it."""
-    if low > threshold:
-        return SUPPORTED
-    return CONTRADICTED if high < threshold else UNDECIDED
-
-
-def below(low: float, high: float, threshold: float) -> str:
-    """Return the verdict on "the statistic lies below `threshold`"."""
-    return above(-high, -low, -threshold)

@@ -11,9 +11,10 @@ import numpy as np
 import pandas as pd
 
 from codesign_bench import stats
-from codesign_bench.claims.claim import Finding, Rule, above, below
+from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.shared import (
+from codesign_bench.claims.finding import Finding, above, below
+from codesign_bench.claims.statistics import (
     OVER_SEEDS,
     check_methods,
     difference,

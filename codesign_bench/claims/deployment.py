@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from codesign_bench.claims.claim import CONTRADICTED, SUPPORTED, Finding, Lacking, Rule
+from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, Lacking
 from codesign_bench.deployment.tables import GRID, OWN
-from codesign_bench.paper_tables import REAL_ROBOT
+from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 
 FEWEST_TOOLS = 4
 """The paper's number of tools, below which nothing is judged."""

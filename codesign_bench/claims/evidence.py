@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from codesign_bench.claims.claim import Lacking
+from codesign_bench.claims.finding import Lacking
+from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.deployment.tables import load_deployment
 from codesign_bench.errors import UserError
-from codesign_bench.profiles import DEFAULT_PROFILE
-from codesign_bench.results import DEFAULT_VARIANT, find_cells, load_evaluations, load_results
-from codesign_bench.sensitivity import load_or_measure
+from codesign_bench.evaluation.sensitivity import load_or_measure
 from codesign_bench.stats import CELL_KEYS, MIN_SEEDS
+from codesign_bench.storage.results import DEFAULT_VARIANT, find_cells, load_evaluations, load_results
 from codesign_bench.task import load_task, task_names
 
 DESIGN_PREFIX = "design_"
@@ -31,11 +31,11 @@ class Evidence:
     curves: pd.DataFrame = field(default_factory=pd.DataFrame)
     """As `codesign_bench.load_results` gives them."""
     evaluations: pd.DataFrame = field(default_factory=pd.DataFrame)
-    """As `codesign_bench.results.load_evaluations` gives them."""
+    """As `codesign_bench.storage.results.load_evaluations` gives them."""
     sensitivity: pd.DataFrame = field(default_factory=pd.DataFrame)
-    """As `codesign_bench.sensitivity.measure` gives it, several tasks below each other."""
+    """As `codesign_bench.evaluation.sensitivity.measure` gives it, several tasks below each other."""
     outside: pd.DataFrame = field(default_factory=pd.DataFrame)
-    """As `codesign_bench.outside.load_or_measure` gives it."""
+    """As `codesign_bench.evaluation.extrapolation.load_or_measure` gives it."""
     deployment: pd.DataFrame = field(default_factory=pd.DataFrame)
     """As `codesign_bench.deployment.tables.load_deployment` gives it."""
     design_widths: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -112,7 +112,7 @@ class Measure:
 
     def outside_region(self, results: Path) -> pd.DataFrame:
         """Return what policies reach outside the region."""
-        from codesign_bench.outside import load_or_measure as load_or_play
+        from codesign_bench.evaluation.extrapolation import load_or_measure as load_or_play
 
         return load_or_play(results, self.outside, self.say, self.missing)
 

@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 from scipy.integrate import trapezoid
 
-from codesign_bench.claims.claim import Finding, Rule, above, below
+from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.shared import OVER_SEEDS, check_budgets, difference, estimate, mean, seeds_of
+from codesign_bench.claims.finding import Finding, above, below
+from codesign_bench.claims.statistics import OVER_SEEDS, check_budgets, difference, estimate, mean, seeds_of
 
 SOLVED = 0.5
 """Share of seeds above which an instance is solved (ours)."""

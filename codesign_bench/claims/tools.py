@@ -10,9 +10,10 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from codesign_bench.claims.claim import CONTRADICTED, SUPPORTED, Finding, Lacking, Rule, above
+from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.shared import OVER_SEEDS, estimate, mean, run_command, seeds_of
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, Lacking, above
+from codesign_bench.claims.statistics import OVER_SEEDS, estimate, mean, run_command, seeds_of
 
 GOAL_SHARE = 0.1
 """Share of the variance of tools that goals must make for tools to vary with the goal (ours)."""

@@ -9,9 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from codesign_bench.claims.claim import Finding, Lacking, Rule, above, below
+from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.shared import FEWEST_LEVELS, OVER_SEEDS, at_each, estimate, mean, seeds_at_each, trend
+from codesign_bench.claims.finding import Finding, Lacking, above, below
+from codesign_bench.claims.statistics import FEWEST_LEVELS, OVER_SEEDS, at_each, estimate, mean, seeds_at_each, trend
 
 MATERIAL, EFFORT, RATIO = "material", "effort", "ratio"
 QUANTITIES = {

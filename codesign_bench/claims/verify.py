@@ -12,14 +12,15 @@ from typing import Any
 from rich.console import Console
 
 from codesign_bench import __version__, stats
-from codesign_bench.claims.claim import CONTRADICTED, UNDECIDED, VERDICTS, Claim, Finding, Lacking
+from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.evidence import Evidence, Measure, load_evidence
-from codesign_bench.claims.paper import CLAIMS, OUTSIDE
+from codesign_bench.claims.finding import CONTRADICTED, UNDECIDED, VERDICTS, Finding, Lacking
+from codesign_bench.config.profiles import DEFAULT_PROFILE
+from codesign_bench.console import print_table
 from codesign_bench.errors import UserError
-from codesign_bench.files import write_bytes, write_json
-from codesign_bench.profiles import DEFAULT_PROFILE
-from codesign_bench.progress import print_table
 from codesign_bench.seeding import generator
+from codesign_bench.storage.files import write_bytes, write_json
+from codesign_bench.studies.corl2023.claims import CLAIMS, OUTSIDE
 from codesign_bench.text_tables import markdown
 
 MARKDOWN_FILE, JSON_FILE = "claims.md", "claims.json"

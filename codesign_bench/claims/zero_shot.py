@@ -10,9 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from codesign_bench.claims.claim import Finding, Lacking, Rule, above, below
+from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.shared import (
+from codesign_bench.claims.finding import Finding, Lacking, above, below
+from codesign_bench.claims.statistics import (
     FEWEST_LEVELS,
     OVER_SEEDS,
     at_each,
@@ -22,7 +23,7 @@ from codesign_bench.claims.shared import (
     seeds_of,
     trend,
 )
-from codesign_bench.outside import RIM
+from codesign_bench.evaluation.extrapolation import RIM
 from codesign_bench.stats import MIN_SEEDS
 
 CLOSE = 0.9

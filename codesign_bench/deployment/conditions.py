@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from codesign_bench.deployment.robot import ARMS, PANDA
 from codesign_bench.errors import UserError, unknown_name
+from codesign_bench.task.robot import ARMS, PANDA
 
 
 @dataclass(frozen=True)

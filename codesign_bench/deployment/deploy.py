@@ -22,11 +22,11 @@ from codesign_bench.deployment.tables import (
     summarise,
 )
 from codesign_bench.errors import UserError
-from codesign_bench.files import write_bytes, write_json
-from codesign_bench.paper_tables import REAL_ROBOT
-from codesign_bench.results import open_folder, write_rows
 from codesign_bench.seeding import generator
-from codesign_bench.task import Behaviour, Task
+from codesign_bench.storage.files import write_bytes, write_json
+from codesign_bench.storage.results import open_folder, write_rows
+from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
+from codesign_bench.task import Behaviour, Task, deployable_tasks
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,8 @@ def deploy(
     """
     if order.trials < 1:
         raise UserError(f"--trials must be at least 1, not {order.trials}")
+    if task.name not in deployable_tasks():
+        raise UserError(f"task '{task.name}' has no deployment; choose from: {', '.join(deployable_tasks())}")
     settings = task.robot_trials()
     tools = order.tools or tuple(range(1, len(settings.own) + 1))
     planned = list(own_trials(settings, tools, REAL_ROBOT.trials if order.protocol else order.trials))

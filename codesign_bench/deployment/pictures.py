@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from codesign_bench.episodes import Episodes
-from codesign_bench.paper_tables import REAL_ROBOT
-from codesign_bench.rendering import Moment, animation
+from codesign_bench.evaluation.rendering import Moment, animation
+from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
+from codesign_bench.task.episodes import Episodes
 
 STRIDE = 3
 """Control steps between two pictures: 8 pictures per second of simulated time."""

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from codesign_bench.deployment.robot import RobotTrials
 from codesign_bench.deployment.tables import GRID, OWN
 from codesign_bench.errors import UserError
 from codesign_bench.task import Floats
+from codesign_bench.task.robot import RobotTrials
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from codesign_bench.deployment.conditions import Conditions, Physics
-from codesign_bench.deployment.robot import ArmReport
-from codesign_bench.episodes import Episodes
-from codesign_bench.paper_tables import REAL_ROBOT
+from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 from codesign_bench.task import Behaviour, Floats, Singles, Task
+from codesign_bench.task.episodes import Episodes
+from codesign_bench.task.robot import ArmReport
 
 SLOT = np.array([0])
 METRE = "m"

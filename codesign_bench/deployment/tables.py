@@ -7,11 +7,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from codesign_bench.deployment.robot import ArmReport, RobotTrials
 from codesign_bench.deployment.rollout import Rollout
 from codesign_bench.errors import UserError
-from codesign_bench.paper_tables import REAL_ROBOT
+from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 from codesign_bench.task import Floats, Task
+from codesign_bench.task.robot import ArmReport, RobotTrials
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from codesign_bench import __version__
-from codesign_bench.episodes import Episodes, portions
 from codesign_bench.errors import UserError
 from codesign_bench.fabrication.picture import picture
 from codesign_bench.fabrication.printability import Print, judge
 from codesign_bench.fabrication.solids import MILLIMETRES, scaled, thickness, tool_solid
-from codesign_bench.files import write_bytes, write_json
-from codesign_bench.results import write_rows
+from codesign_bench.storage.files import write_bytes, write_json
+from codesign_bench.storage.results import write_rows
 from codesign_bench.task import Behaviour, Box, Floats, Task
+from codesign_bench.task.episodes import Episodes, portions
 
 if TYPE_CHECKING:
     from trimesh import Trimesh

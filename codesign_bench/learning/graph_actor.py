@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from codesign_bench.learning.features import Features
 from codesign_bench.learning.networks import GraphNetwork, IndexMLP, RunningNorm, torch_generator
-from codesign_bench.learning.observations import Features
 from codesign_bench.task import Task
 
 

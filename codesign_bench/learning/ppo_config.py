@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import inf
 
-from codesign_bench.learning.ranges import check_given, check_range
+from codesign_bench.config.validation import check_given, check_range
 
 TRANSFORM2ACT = {"source": "Transform2Act's default; the paper is silent"}
 OURS = {"source": "ours"}

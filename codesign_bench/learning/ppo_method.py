@@ -11,7 +11,7 @@ import numpy as np
 from codesign_bench.learning.actor import Actor, ActorPolicy, load_module_arrays
 from codesign_bench.learning.ppo_config import PPOConfig
 from codesign_bench.learning.two_phase import TwoPhaseLearner
-from codesign_bench.learning.values import ValueNetwork
+from codesign_bench.learning.value_networks import ValueNetwork
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Task

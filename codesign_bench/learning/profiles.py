@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from codesign_bench.paper_tables import LEARNERS, MlpBaselineTable
+from codesign_bench.studies.corl2023.learners import LEARNERS, MlpBaselineTable
 
 Sourced = Mapping[str, tuple[Any, str]]
 """Values of hyperparameters with their sources."""

@@ -18,10 +18,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 import torch
 
-from codesign_bench.episodes import Episodes
 from codesign_bench.learning.actor import Actor
 from codesign_bench.method import Problem
 from codesign_bench.task import Booleans, Floats, Singles, Slots
+from codesign_bench.task.episodes import Episodes
 
 LOG_SQRT_TWO_PI = 0.5 * float(np.log(2.0 * np.pi))
 

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from codesign_bench.host import end_with
 from codesign_bench.learning.actor import Actor
 from codesign_bench.learning.rollout import Collector, Trajectories
 from codesign_bench.method import Problem
+from codesign_bench.processes import end_with
 from codesign_bench.task import Singles
 
 _collector: Collector | None = None

@@ -32,7 +32,7 @@ from codesign_bench.learning.ppo import (
 from codesign_bench.learning.ppo_config import PPOConfig
 from codesign_bench.learning.rollout import Collector, Trajectories, group_sizes, joined, slots_for
 from codesign_bench.learning.rollout_pool import Group, RolloutPool
-from codesign_bench.learning.values import DesignValue, ValueNetwork
+from codesign_bench.learning.value_networks import DesignValue, ValueNetwork
 from codesign_bench.method import BatchReport, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Floats, Singles, Slots

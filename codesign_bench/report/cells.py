@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from codesign_bench.console import duration
 from codesign_bench.errors import UserError
-from codesign_bench.progress import duration
 from codesign_bench.registry import names
-from codesign_bench.results import CELL_PATTERN, DEFAULT_VARIANT, FAILED, LABEL_COLUMN, cell_status, find_cells
-from codesign_bench.show import status_row
+from codesign_bench.storage.results import CELL_PATTERN, DEFAULT_VARIANT, FAILED, LABEL_COLUMN, cell_status, find_cells
+from codesign_bench.storage.status import status_row
 
 from .tables import NOTHING, Table, listed
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codesign_bench.claims.evidence import load_evidence
-from codesign_bench.claims.paper import CLAIMS
 from codesign_bench.claims.verify import Row, judge, missing, summary
 from codesign_bench.errors import UserError
+from codesign_bench.studies.corl2023.claims import CLAIMS
 
 from .tables import NOTHING, Table
 

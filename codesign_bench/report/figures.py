@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from codesign_bench.plotting import Drawing, csv_bytes, possible_drawings
+from codesign_bench.figures.drawing import Drawing, csv_bytes, possible_drawings
 from codesign_bench.text_tables import is_number, read_markdown
 
 from .tables import Table

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from codesign_bench.results import DONE
 from codesign_bench.seeding import generator
 from codesign_bench.stats import (
     CELL_KEYS,
@@ -24,6 +23,7 @@ from codesign_bench.stats import (
     mean_interval,
     probability_of_improvement,
 )
+from codesign_bench.storage.results import DONE
 
 from .cells import CellRecord, in_order, variants
 from .tables import NOTHING, number

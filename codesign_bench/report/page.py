@@ -15,10 +15,10 @@ import pandas as pd
 from markupsafe import Markup, escape
 
 from codesign_bench.errors import UserError
-from codesign_bench.files import write_bytes
-from codesign_bench.plotting import make_folder
-from codesign_bench.results import CURVE_COLUMNS, load_results
+from codesign_bench.figures.drawing import make_folder
 from codesign_bench.stats import CELL_KEYS
+from codesign_bench.storage.files import write_bytes
+from codesign_bench.storage.results import CURVE_COLUMNS, load_results
 
 from . import cells as cell_parts
 from . import provenance

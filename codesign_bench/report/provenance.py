@@ -11,8 +11,8 @@ from statistics import median
 from typing import Any
 
 import codesign_bench
-from codesign_bench.config import METHOD, RUN
-from codesign_bench.progress import duration
+from codesign_bench.config.resolve import METHOD, RUN
+from codesign_bench.console import duration
 
 from .cells import CellRecord, in_order
 from .tables import NOTHING, Table, listed

@@ -9,8 +9,9 @@ import pandas as pd
 import pytest
 
 from codesign_bench.claims import deployment
-from codesign_bench.claims.claim import CONTRADICTED, SUPPORTED, Finding, Lacking, Rule
+from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, Lacking
 
 OWN = deployment.own_instance_solved("fetch_cube", "gnn_ppo")
 GRID = deployment.no_tool_solves_the_grid("fetch_cube", "gnn_ppo")

@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 
 from codesign_bench.claims import comparison, fine_tuning, tools, tradeoff, zero_shot
-from codesign_bench.claims.claim import CONTRADICTED, SUPPORTED, UNDECIDED, Finding, Lacking, Rule, above, below
+from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, Finding, Lacking, above, below
 
 TASK, OURS, OTHER = "push", "gnn_ppo", "cma_rl"
 

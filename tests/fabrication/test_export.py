@@ -14,9 +14,9 @@ from PIL import Image
 from codesign_bench import load_task, task_names
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
-from codesign_bench.evaluate import evaluate
+from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.evaluation.rendering import RandomBehaviour
 from codesign_bench.fabrication.export import Order, export
-from codesign_bench.rendering import RandomBehaviour
 
 REFERENCE = Path(__file__).resolve().parents[2] / "results" / "reference"
 PUSH = REFERENCE / "push" / "gnn_ppo" / "default" / "seed-00"

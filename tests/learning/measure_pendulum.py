@@ -22,7 +22,7 @@ from pendulum import BUDGET, ENVIRONMENT, MAX_TORQUE, OURS, STABLE_BASELINES3, P
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecNormalize
 
-from codesign_bench.evaluate import evaluate
+from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.learning.networks import RunningNorm
 from codesign_bench.method import Policy
 from codesign_bench.task import Singles

@@ -16,7 +16,7 @@ import gymnasium
 import numpy as np
 import torch
 
-from codesign_bench.evaluate import evaluate
+from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.learning.two_phase import TwoPhaseLearner
 from codesign_bench.method import Problem, load_method
 from codesign_bench.seeding import Streams

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codesign_bench.learning.evolution import Evolution, EvolutionConfig, paper_evolution
-from codesign_bench.paper_tables import CMA_ES_SWEEP
+from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, paper_evolution
+from codesign_bench.studies.corl2023.learners import CMA_ES_SWEEP
 from codesign_bench.task import Floats
 
 CONFIG = EvolutionConfig(popsize=8, sigma0=0.3)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import torch
 
+from codesign_bench.learning.features import Features
 from codesign_bench.learning.networks import (
     MLP,
     GraphConvolution,
@@ -23,7 +24,6 @@ from codesign_bench.learning.networks import (
     adjacency_matrix,
     torch_generator,
 )
-from codesign_bench.learning.observations import Features
 from codesign_bench.task import ToolGraph, load_task
 
 RECORD = json.loads((Path(__file__).parent.parent / "data" / "graph_convolution.json").read_text(encoding="utf-8"))

@@ -14,7 +14,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from codesign_bench.episodes import Episodes
+from codesign_bench.task.episodes import Episodes
 
 HERE = Path(__file__).parent
 RECORD = HERE.parent / "data" / "pendulum_stable_baselines3.json"

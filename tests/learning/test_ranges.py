@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from codesign_bench.learning.evolution import EvolutionConfig
+from codesign_bench.learning.cma_es import EvolutionConfig
 from codesign_bench.learning.ppo_config import GraphConfig, PerceptronConfig, PPOConfig
 
 

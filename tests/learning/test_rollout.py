@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import torch
 
-from codesign_bench.episodes import Episodes
 from codesign_bench.learning.ppo import gaussian
 from codesign_bench.learning.rollout import (
     Collector,
@@ -22,6 +21,7 @@ from codesign_bench.learning.rollout import (
 from codesign_bench.learning.two_phase import TwoPhaseLearner
 from codesign_bench.method import Problem
 from codesign_bench.task import Task
+from codesign_bench.task.episodes import Episodes
 
 STEPS, SLOTS = 60, 4
 

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 import torch
 
-from codesign_bench.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
-from codesign_bench.episodes import Episodes
+from codesign_bench.config.profiles import PROFILES
 from codesign_bench.method import Method, Policy, load_method, method_names
-from codesign_bench.paper_tables import LEARNERS
-from codesign_bench.profiles import PROFILES
+from codesign_bench.storage.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
+from codesign_bench.studies.corl2023.learners import LEARNERS
 from codesign_bench.task import Singles, Task
+from codesign_bench.task.episodes import Episodes
 
 MakeMethod = Callable[..., Method[Any]]
 EVERY_METHOD = pytest.mark.parametrize("name", method_names())

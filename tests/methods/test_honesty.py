@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 import torch
 
-from codesign_bench.config import resolve
-from codesign_bench.episodes import Episodes
+from codesign_bench.config.profiles import PROFILES
+from codesign_bench.config.resolve import resolve
 from codesign_bench.learning.actor import Actor
 from codesign_bench.method import Method, load_method
-from codesign_bench.profiles import PROFILES
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Singles, Task, load_task, task_names
+from codesign_bench.task.episodes import Episodes
 
 MakeMethod = Callable[..., Method[Any]]
 PPO_BASED = ("gnn_ppo", "shared_arch", "hwasp_minimal")

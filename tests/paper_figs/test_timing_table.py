@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from codesign_bench.errors import UserError
-from codesign_bench.paper_tables import TIMINGS
 from codesign_bench.registry import load_module
+from codesign_bench.studies.corl2023.protocol import TIMINGS
 
 figure: Any = load_module("paper_figs", "timing_table")
 

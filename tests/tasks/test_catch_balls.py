@@ -15,10 +15,10 @@ import numpy as np
 import pymunk
 import pytest
 
-from codesign_bench.episodes import Episodes
-from codesign_bench.evaluate import evaluate
+from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.registry import load_module
 from codesign_bench.task import Behaviour, Floats, Singles, load_task
+from codesign_bench.task.episodes import Episodes
 
 catch: Any = load_module("tasks", "catch_balls")
 SLOT = np.array([0])

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from codesign_bench.episodes import Episodes, Tradeoff
 from codesign_bench.errors import UserError
 from codesign_bench.method import Problem
 from codesign_bench.task import Booleans, Floats, Singles, Task, load_task, task_names
+from codesign_bench.task.episodes import Episodes, Tradeoff
 
 EPISODES = 4
 STEPS = 60

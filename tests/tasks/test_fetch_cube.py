@@ -18,12 +18,12 @@ import numpy as np
 import pybullet
 import pytest
 
-from codesign_bench.episodes import Episodes
 from codesign_bench.errors import UserError
-from codesign_bench.evaluate import evaluate
-from codesign_bench.paper_tables import PROTOCOL
+from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.registry import load_module
+from codesign_bench.studies.corl2023.protocol import PROTOCOL
 from codesign_bench.task import Behaviour, Floats, Singles, load_task
+from codesign_bench.task.episodes import Episodes
 
 fetch: Any = load_module("tasks", "fetch_cube")
 SLOT = np.array([0])

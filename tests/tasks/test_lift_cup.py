@@ -15,9 +15,9 @@ import numpy as np
 import pybullet
 import pytest
 
-from codesign_bench.episodes import Episodes
 from codesign_bench.registry import load_module
 from codesign_bench.task import Behaviour, Floats, load_task
+from codesign_bench.task.episodes import Episodes
 
 lift: Any = load_module("tasks", "lift_cup")
 bullet: Any = inspect.getmodule(lift.BulletSimulator)
@@ -325,7 +325,7 @@ def test_the_observation_tells_what_the_tool_lacks_to_fit() -> None:
 def test_the_script_lifts_cups_of_every_corner_and_random_tools_rarely() -> None:
     task = load_task("lift_cup")
     cups = np.array(list(product((0.3, 0.9), (0.6, 0.9))))
-    from codesign_bench.evaluate import evaluate
+    from codesign_bench.evaluation.evaluate import evaluate
 
     assert evaluate(task, task.script(), instances=cups).successes.all()
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from codesign_bench import load_task
-from codesign_bench.deployment.robot import IDEAL, PANDA, ArmReport
-from codesign_bench.episodes import Episodes
+from codesign_bench.task.episodes import Episodes
+from codesign_bench.task.robot import IDEAL, PANDA, ArmReport
 
 kinematics: Any = import_module("codesign_bench.tasks._panda_kinematics")
 panda: Any = import_module("codesign_bench.tasks._panda")

@@ -16,9 +16,9 @@ import numpy as np
 import pymunk
 import pytest
 
-from codesign_bench.episodes import Episodes
 from codesign_bench.registry import load_module
 from codesign_bench.task import Floats, load_task
+from codesign_bench.task.episodes import Episodes
 
 push: Any = load_module("tasks", "push")
 REACH = push.PUCK_RADIUS + push.LINK_HALF_WIDTH

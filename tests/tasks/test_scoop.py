@@ -14,10 +14,10 @@ import numpy as np
 import pymunk
 import pytest
 
-from codesign_bench.episodes import Episodes
-from codesign_bench.evaluate import evaluate
+from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.registry import load_module
 from codesign_bench.task import Behaviour, Floats, Singles, load_task
+from codesign_bench.task.episodes import Episodes
 
 scoop: Any = load_module("tasks", "scoop")
 SLOT = np.array([0])

@@ -14,11 +14,11 @@ import numpy as np
 import pybullet
 import pytest
 
-from codesign_bench.episodes import Episodes
-from codesign_bench.evaluate import evaluate
+from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.evaluation.sensitivity import GivenTools
 from codesign_bench.registry import load_module
-from codesign_bench.sensitivity import GivenTools
 from codesign_bench.task import Floats, load_task
+from codesign_bench.task.episodes import Episodes
 
 scoop: Any = load_module("tasks", "scoop_3d")
 SLOT = np.array([0])

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from codesign_bench.episodes import Episodes
-from codesign_bench.evaluate import evaluate
+from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.task import Behaviour, Floats, Simulator, Soundness, Task, load_task, task_names
+from codesign_bench.task.episodes import Episodes
 
 SLOTS = 16
 HELD_STEPS = 8

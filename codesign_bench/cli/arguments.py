@@ -1,0 +1,103 @@
+"""Arguments that several commands share: where results lie, how values are written, what names mean."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from codesign_bench.config.profiles import DEFAULT_PROFILE
+from codesign_bench.config.values import parse_int
+from codesign_bench.errors import UserError, unknown_name
+from codesign_bench.registry import names
+
+DEFAULT_RESULTS = Path("results/runs")
+DEFAULT_FIGURES = Path("results/figures")
+DEFAULT_CLAIMS = Path("results/claims")
+DEFAULT_REPORT = Path("results/report.html")
+ALL = "all"
+
+
+def add_results(parser: argparse.ArgumentParser) -> None:
+    """Add `--results`, the folder that a command reads."""
+    parser.add_argument(
+        "--results", type=Path, default=DEFAULT_RESULTS, metavar="DIR", help=f"default: {DEFAULT_RESULTS}"
+    )
+
+
+def add_out(parser: argparse.ArgumentParser, default: Path, metavar: str = "DIR") -> None:
+    """Add `--out`, where a command writes."""
+    parser.add_argument("--out", type=Path, default=default, metavar=metavar, help=f"default: {default}")
+
+
+def add_profile(parser: argparse.ArgumentParser) -> None:
+    """Add `--profile`."""
+    parser.add_argument("--profile", default=DEFAULT_PROFILE, metavar="P", help=f"default: {DEFAULT_PROFILE}")
+
+
+def add_jobs(parser: argparse.ArgumentParser) -> None:
+    """Add `--jobs`, the number of cells at a time."""
+    parser.add_argument(
+        "--jobs", type=integer, metavar="N", help="cells at a time; default: as many as there are cores"
+    )
+
+
+def add_config(parser: argparse.ArgumentParser) -> None:
+    """Add what decides a cell's configuration: profile, budget and single settings."""
+    add_profile(parser)
+    parser.add_argument(
+        "--steps", type=integer, metavar="N", help="budget in environment steps (default: the profile's)"
+    )
+    parser.add_argument(
+        "--set",
+        dest="overrides",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="KEY=VALUE",
+        help="override a run setting or a hyperparameter; METHOD.KEY=VALUE for one method",
+    )
+
+
+def integer(text: str) -> int:
+    """Return an integer written as 150000, 150_000 or 1.5e5."""
+    try:
+        return parse_int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not an integer") from None
+
+
+def seed(text: str) -> int:
+    """Return a seed."""
+    if (value := integer(text)) < 0:
+        raise argparse.ArgumentTypeError(f"a seed must be at least 0, not {value}")
+    return value
+
+
+def check_at_least_one(options: argparse.Namespace, *options_names: str) -> None:
+    """Refuse options, if given, that are below 1.
+
+    Raises:
+        UserError: naming the first.
+    """
+    for name in options_names:
+        value = getattr(options, name)
+        if value is not None and value < 1:
+            raise UserError(f"--{name.replace('_', '-')} must be at least 1, not {value}")
+
+
+def chosen_names(group: str, given: Sequence[str], everything: Sequence[str]) -> list[str]:
+    """Return the names that an argument means, in the order given: separate words or commas, `all` for `everything`.
+
+    Raises:
+        UserError: an unknown name, or none at all.
+    """
+    words = [word for text in given for word in text.split(",") if word]
+    chosen = list(dict.fromkeys(name for word in words for name in (everything if word == ALL else (word,))))
+    known = names(group)
+    for name in chosen:
+        if name not in known:
+            raise unknown_name(group.rstrip("s"), name, (*known, ALL))
+    if not chosen:
+        raise UserError(f"--{group.rstrip('s')}: no name given; choose from: {', '.join((*known, ALL))}")
+    return chosen

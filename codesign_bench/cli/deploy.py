@@ -1,0 +1,73 @@
+"""`codesign-bench deploy`: try a policy and its tools on a simulated robot arm."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rich.console import Console
+
+from codesign_bench.cli.arguments import DEFAULT_RESULTS, add_out, integer, seed
+from codesign_bench.console import printer
+from codesign_bench.errors import UserError
+
+HELP = "try a policy and its tools on a simulated robot arm"
+CONDITIONS = ("arm", "observation_noise", "latency", "friction", "mass")
+"""Options that change a condition of the trials."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the policy, its trials and their conditions."""
+    parser.add_argument("--policy", type=Path, required=True, metavar="CELL", help="folder of a finished cell")
+    parser.add_argument("--task", metavar="T", help="default: the task of --policy")
+    parser.add_argument(
+        "--protocol", action="store_true", help="the paper's Table 1: five trials of each tool, and the grid of starts"
+    )
+    parser.add_argument("--tool", nargs="+", type=integer, default=[], metavar="N", help="default: all of them")
+    parser.add_argument("--trials", type=integer, metavar="N", help="of each tool; default: 1")
+    parser.add_argument("--arm", help="panda (default), or ideal: the gantry of training")
+    parser.add_argument(
+        "--observation-noise",
+        type=float,
+        metavar="M",
+        help="standard deviation of every observed length, m (default 0; the protocol uses 0.002)",
+    )
+    parser.add_argument(
+        "--latency", type=integer, metavar="STEPS", help="delay of the observed state (default 0; the protocol uses 1)"
+    )
+    for name in ("friction", "mass"):
+        parser.add_argument(
+            f"--{name}",
+            type=float,
+            metavar="SHARE",
+            help=f"randomise {name} by up to +-SHARE (default 0; the protocol uses 0.2)",
+        )
+    parser.add_argument("--seed", type=seed, default=0, help="seed of noise and randomisation; default: 0")
+    parser.add_argument("--no-gifs", action="store_true", help="do not draw the trials")
+    add_out(parser, DEFAULT_RESULTS)
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Run the trials and write their tables and pictures."""
+    from dataclasses import replace
+
+    from codesign_bench.deployment.conditions import TRIAL, Conditions
+    from codesign_bench.deployment.deploy import Order, deploy
+    from codesign_bench.storage.policies import policy_and_task
+
+    if options.protocol and (options.tool or options.trials is not None):
+        raise UserError("deploy: --protocol sets tools and trials itself; leave out --tool and --trials")
+    given = {name: getattr(options, name) for name in CONDITIONS if getattr(options, name) is not None}
+    conditions = replace(TRIAL if options.protocol else Conditions(), **given)
+    conditions.check()
+    order = Order(
+        conditions,
+        tools=tuple(options.tool),
+        trials=1 if options.trials is None else options.trials,
+        protocol=options.protocol,
+        seed=options.seed,
+        gifs=not options.no_gifs,
+    )
+    policy, task = policy_and_task(options.policy, options.task)
+    deploy(task, policy, order, options.out, printer(console), str(options.policy))
+    return 0

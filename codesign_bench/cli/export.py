@@ -1,0 +1,43 @@
+"""`codesign-bench export`: write a policy's tools as solids to print."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+
+from rich.console import Console
+
+from codesign_bench.console import printer
+
+HELP = "write a policy's tools as solids to print"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the policy, the instances whose tools are written, and the folder."""
+    # So that a value that starts with a minus sign, as in `--start -0.2,0.7`, is not read as an option.
+    parser._negative_number_matcher = re.compile(r"^-\.?\d")
+    parser.add_argument("--policy", type=Path, required=True, metavar="CELL", help="folder of a finished cell")
+    parser.add_argument("--task", metavar="T", help="default: the task of --policy")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--start", metavar="X,Y", help="the tool for an object that starts there, m")
+    which.add_argument("--goal", metavar="G,...", help="the tool for this goal, in the task's units")
+    which.add_argument(
+        "--instances", metavar="N,...", help="tools for these evaluation instances; default: all of them"
+    )
+    parser.add_argument("--scale", type=float, default=1.0, metavar="S", help="size of the print; default: 1")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Write the tools."""
+    from codesign_bench.fabrication.export import ALL, Order, export
+    from codesign_bench.storage.policies import policy_and_task
+
+    policy, task = policy_and_task(options.policy, options.task)
+    given = {name: getattr(options, name) for name in ("start", "goal", "instances")}
+    if all(value is None for value in given.values()):
+        given["instances"] = ALL
+    order = Order.of(task, **given, scale=options.scale)
+    export(task, policy, order, options.out, printer(console), str(options.policy))
+    return 0

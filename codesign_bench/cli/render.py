@@ -1,0 +1,51 @@
+"""`codesign-bench render`: what a policy, a script or random behaviour does, as an animation or a picture."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rich.console import Console
+
+from codesign_bench.cli.arguments import check_at_least_one, integer, seed
+from codesign_bench.console import printer
+from codesign_bench.errors import UserError
+
+HELP = "draw what a policy does, as an animation or a picture"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what acts, on which task, and the file."""
+    parser.add_argument("--task", metavar="T", help="default: the task of --policy")
+    parser.add_argument(
+        "--policy", type=Path, metavar="CELL", help="folder of a finished cell, whose final policy acts"
+    )
+    parser.add_argument(
+        "--behaviour", choices=("random", "script"), help="what acts without --policy; default: the task's script"
+    )
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="ends in .gif or .png")
+    parser.add_argument("--episodes", type=integer, default=4, metavar="N", help="default: 4")
+    parser.add_argument("--seed", type=seed, default=0, help="seed of random behaviour; default: 0")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Draw the episodes and print the path."""
+    from codesign_bench.evaluation.rendering import RandomBehaviour, render
+    from codesign_bench.seeding import generator
+    from codesign_bench.storage.policies import policy_and_task
+    from codesign_bench.task import Behaviour, load_task
+
+    if options.policy is None and options.task is None:
+        raise UserError("render: give --task, or --policy, whose task is known")
+    if options.policy is not None and options.behaviour is not None:
+        raise UserError("render: give either --policy or --behaviour, not both")
+    check_at_least_one(options, "episodes")
+    behaviour: Behaviour
+    if options.policy is not None:
+        behaviour, task = policy_and_task(options.policy, options.task)
+    else:
+        task = load_task(options.task)
+        random = options.behaviour == "random"
+        behaviour = RandomBehaviour(task, generator(options.seed, "render")) if random else task.script()
+    printer(console)(render(task, behaviour, options.out, options.episodes))
+    return 0

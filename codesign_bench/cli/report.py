@@ -1,0 +1,26 @@
+"""`codesign-bench report`: one HTML page on everything that a results folder holds."""
+
+from __future__ import annotations
+
+import argparse
+
+from rich.console import Console
+
+from codesign_bench.cli.arguments import DEFAULT_REPORT, add_out, add_results
+from codesign_bench.console import printer
+
+HELP = "write one page on everything that a results folder holds"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the folder and the file."""
+    add_results(parser)
+    add_out(parser, DEFAULT_REPORT, metavar="FILE")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Write the page and print its path."""
+    from codesign_bench.report.page import write_report
+
+    write_report(options.results, options.out, printer(console))
+    return 0

@@ -1,0 +1,52 @@
+"""`codesign-bench reproduce`: run what experiments need, then draw, verify and report them."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+from pathlib import Path
+
+from rich.console import Console
+
+from codesign_bench.cli.arguments import (
+    DEFAULT_FIGURES,
+    DEFAULT_RESULTS,
+    add_jobs,
+    add_out,
+    add_profile,
+    check_at_least_one,
+    integer,
+)
+
+HELP = "run what figures of the paper need, then draw them"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the experiments, their size, and where results and figures go."""
+    parser.add_argument("experiments", nargs="*", metavar="FIGURE", help="names, or all (default)")
+    add_profile(parser)
+    parser.add_argument("--seeds", type=integer, metavar="N", help="seeds of every cell (default: the paper's)")
+    add_jobs(parser)
+    add_out(parser, DEFAULT_RESULTS)
+    parser.add_argument(
+        "--figures", type=Path, default=DEFAULT_FIGURES, metavar="DIR", help=f"default: {DEFAULT_FIGURES}"
+    )
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Run, draw, verify and report; 1 if some cell failed."""
+    from codesign_bench.config.profiles import run_profile
+    from codesign_bench.study.reproduce import reproduce
+
+    run_profile(options.profile, "push")  # refuses an unknown profile before anything runs
+    check_at_least_one(options, "seeds", "jobs")
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does.
+    return reproduce(
+        options.experiments,
+        profile=options.profile,
+        results=options.out,
+        figures=options.figures,
+        console=console,
+        jobs=options.jobs,
+        seeds=options.seeds,
+    )

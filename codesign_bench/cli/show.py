@@ -1,0 +1,46 @@
+"""`codesign-bench show`: the resolved configuration, every value with its source."""
+
+from __future__ import annotations
+
+import argparse
+
+from rich.console import Console
+
+from codesign_bench.cli.arguments import add_config, check_at_least_one
+
+HELP = "the resolved configuration, every value with its source"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the cell that is asked about."""
+    parser.add_argument("--method", required=True, metavar="M")
+    parser.add_argument("--task", required=True, metavar="T")
+    add_config(parser)
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Print every value of a cell's configuration with its source."""
+    from codesign_bench.cell.cell import Cell
+    from codesign_bench.config.resolve import check_overrides
+    from codesign_bench.console import print_table
+    from codesign_bench.method import load_method
+    from codesign_bench.task import load_task
+
+    check_at_least_one(options, "steps")
+    load_task(options.task)
+    check_overrides(options.overrides, [load_method(options.method)])
+    cell = Cell(
+        options.task,
+        options.method,
+        seed=0,
+        profile=options.profile,
+        steps=options.steps,
+        overrides=tuple(options.overrides),
+    )
+    rows = [
+        (part, name, str(entry["value"]), entry["source"])
+        for part, entries in cell.config().as_json().items()
+        for name, entry in entries.items()
+    ]
+    print_table(console, ("part", "name", "value", "source"), rows)
+    return 0

@@ -1,0 +1,180 @@
+"""Resolve a cell's configuration: defaults, then the profile, then the command line; every value keeps its source."""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from codesign_bench.config.profiles import RunSettings, run_profile
+from codesign_bench.config.values import parse_value
+from codesign_bench.errors import UserError
+from codesign_bench.method import Method
+
+RUN = "run"
+"""The prefix of run settings, and their part of a configuration."""
+METHOD = "method"
+
+
+@dataclass(frozen=True)
+class ResolvedConfig:
+    """Everything a cell is run with."""
+
+    run: RunSettings
+    method: Any
+    """An instance of the method's `config_class`."""
+    sources: Mapping[str, str]
+    """Where each value comes from; keys `run.<name>` and `method.<name>`."""
+
+    def as_json(self) -> dict[str, dict[str, dict[str, Any]]]:
+        """Return part ("run", "method") -> name -> {"value", "source"}."""
+        parts = {RUN: self.run, METHOD: self.method}
+        return {
+            part: {
+                field.name: {
+                    "value": _as_plain(getattr(values, field.name)),
+                    "source": self.sources[f"{part}.{field.name}"],
+                }
+                for field in fields(values)
+            }
+            for part, values in parts.items()
+        }
+
+
+def resolve(
+    method_class: type[Method[Any]],
+    task_name: str,
+    profile: str,
+    overrides: Iterable[str] = (),
+    steps: int | None = None,
+) -> ResolvedConfig:
+    """Return the configuration of `method_class` on a task under `profile`.
+
+    Args:
+        overrides: `key=value` or `prefix.key=value` with a method's name or `run` as prefix; keys of other methods are
+            passed over.
+        steps: the budget of `--steps`, or None for the profile's.
+
+    Raises:
+        UserError: an unknown profile, a value of the wrong type or out of range.
+    """
+    run_values, run_sources = _start(RunSettings, run_profile(profile, task_name))
+    method_values, method_sources = _start(method_class.config_class, method_class.profile(profile, task_name))
+    if steps is not None:
+        run_values["steps"], run_sources["steps"] = steps, "--steps"
+    for override in overrides:
+        prefix, key, text = split_override(override)
+        if prefix in (None, RUN) and key in run_values:
+            run_values[key], run_sources[key] = _parse_field(RunSettings, key, text), "--set"
+        elif prefix in (None, method_class.name) and key in method_values:
+            method_values[key], method_sources[key] = _parse_field(method_class.config_class, key, text), "--set"
+    return ResolvedConfig(
+        run=_build(RunSettings, run_values),
+        method=_build(method_class.config_class, method_values),
+        sources={
+            **{f"{RUN}.{name}": source for name, source in run_sources.items()},
+            **{f"{METHOD}.{name}": source for name, source in method_sources.items()},
+        },
+    )
+
+
+def check_overrides(overrides: Iterable[str], method_classes: Sequence[type[Method[Any]]]) -> None:
+    """Refuse an override that no selected method and no run setting knows.
+
+    Raises:
+        UserError: naming the override and the keys there are.
+    """
+    run_keys = [field.name for field in fields(RunSettings)]
+    for override in overrides:
+        prefix, key, _ = split_override(override)
+        asked = [method for method in method_classes if prefix in (None, method.name)]
+        known = [field.name for method in asked for field in fields(method.config_class)]
+        known += run_keys if prefix in (None, RUN) else []
+        if not known:
+            choices = ", ".join([RUN, *(method.name for method in method_classes)])
+            raise UserError(f"--set {override}: '{prefix}' is none of the selected methods; choose from: {choices}")
+        if key not in known:
+            raise UserError(f"--set {override}: unknown key '{key}'; choose from: {', '.join(dict.fromkeys(known))}")
+
+
+def split_override(override: str) -> tuple[str | None, str, str]:
+    """Split `prefix.key=value` into prefix (None if there is none), key and value.
+
+    Raises:
+        UserError: it has another form.
+    """
+    name, equals, text = override.partition("=")
+    prefix, dot, key = name.strip().rpartition(".")
+    if not equals or not key:
+        raise UserError(f"--set {override}: write it as key=value or method.key=value")
+    return (prefix if dot else None), key, text.strip()
+
+
+def method_config(config_class: type, stored: Mapping[str, Mapping[str, Any]]) -> Any:
+    """Rebuild a method's configuration from the `method` part of `ResolvedConfig.as_json`.
+
+    Raises:
+        UserError: it does not fit the method's present configuration.
+    """
+    hints = typing.get_type_hints(config_class)
+    try:
+        values = {name: _restore(hints[name], entry["value"]) for name, entry in stored.items()}
+        return config_class(**values)
+    except (KeyError, TypeError, ValueError) as error:
+        raise UserError(f"the stored configuration does not fit {config_class.__qualname__}: {error}") from error
+
+
+def differences(stored: Mapping[str, Any], resolved: ResolvedConfig) -> list[str]:
+    """Return "name: stored value, asked value" for each value in which `ResolvedConfig.as_json` and `resolved` differ.
+
+    A name that the stored configuration lacks did not exist when it was stored: it counts as the class's default,
+    which is why a new hyperparameter's default must mean "as before".
+    """
+    found = []
+    for part, values in ((RUN, resolved.run), (METHOD, resolved.method)):
+        old, new, defaults = stored.get(part, {}), resolved.as_json()[part], type(values)()
+        for name in dict.fromkeys((*old, *new)):
+            absent = _as_plain(getattr(defaults, name, "absent"))
+            before = old.get(name, {}).get("value", absent)
+            after = new.get(name, {}).get("value", "absent")
+            if before != after:
+                found.append(f"{name}: there {before}, asked {after}")
+    return found
+
+
+def _start(config_class: type, profile: Mapping[str, tuple[Any, str]]) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the defaults of a dataclass with a profile laid over them, and every value's source."""
+    defaults = config_class()
+    values = {field.name: getattr(defaults, field.name) for field in fields(defaults)}
+    sources = {field.name: str(field.metadata.get("source", "default")) for field in fields(defaults)}
+    for name, (value, source) in profile.items():
+        if name not in values:
+            raise TypeError(f"a profile sets '{name}', which {config_class.__qualname__} does not have")
+        values[name], sources[name] = value, source
+    return values, sources
+
+
+def _build(config_class: type, values: Mapping[str, Any]) -> Any:
+    try:
+        return config_class(**values)
+    except ValueError as error:
+        raise UserError(f"bad configuration: {error}") from error
+
+
+def _parse_field(config_class: type, name: str, text: str) -> Any:
+    try:
+        return parse_value(typing.get_type_hints(config_class)[name], text)
+    except ValueError as error:
+        raise UserError(f"--set {name}={text}: expected {error}") from error
+
+
+def _as_plain(value: Any) -> Any:
+    """Return the JSON form of a value: tuples become lists, so that stored and resolved values compare."""
+    return [_as_plain(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def _restore(annotation: Any, value: Any) -> Any:
+    if isinstance(value, list):
+        return tuple(_restore(None, item) for item in value)
+    return float(value) if annotation is float and isinstance(value, int) else value

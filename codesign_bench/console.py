@@ -1,0 +1,53 @@
+"""What the user reads: lines, tables, and numbers in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+from rich.console import Console
+from rich.table import Table
+
+Log: TypeAlias = Callable[[str], None]
+"""Shows the user a line."""
+
+
+def printer(console: Console) -> Log:
+    """Return a function that prints a line as it is: no markup, no colours, nothing cut off."""
+
+    def log(line: str) -> None:
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+    return log
+
+
+def silent(line: str) -> None:
+    """Show nothing."""
+
+
+def number(value: float | None) -> str:
+    """Return a number with two decimals, or nothing."""
+    return "" if value is None else f"{value:.2f}"
+
+
+def duration(seconds: float) -> str:
+    """Return seconds in the largest unit that fits: 45 s, 12 min, 3.5 h."""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 90.0 * 60.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def print_table(console: Console, headings: Sequence[str], table_rows: Sequence[Sequence[str]]) -> None:
+    """Print a table: drawn on a terminal, else aligned lines that nothing cuts off."""
+    if console.is_terminal:
+        table = Table()
+        for heading in headings:
+            table.add_column(heading, overflow="fold")
+        for row in table_rows:
+            table.add_row(*row)
+        console.print(table, markup=False, highlight=False)
+        return
+    widths = [max(len(text) for text in column) for column in zip(headings, *table_rows, strict=True)]
+    for row in (headings, *table_rows):
+        line = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip()
+        console.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,112 @@
+"""Judge a policy on a task's fixed evaluation instances, acting with the mean.
+
+Shapes: `N` evaluation instances, `I` instance, `D` design.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from codesign_bench.task import Behaviour, Booleans, Floats, Task
+from codesign_bench.task.episodes import Episodes, Tradeoff, portions
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One episode per evaluation instance."""
+
+    instances: Floats
+    """(N, I) in the instance space's units."""
+    designs: Floats
+    """(N, D) in the design space's units."""
+    returns: Floats
+    """(N,) undiscounted sums of reward, the trade-off's share included."""
+    successes: Booleans
+    """(N,)"""
+    lengths: Floats
+    """(N,) control steps."""
+    material: Floats
+    """(N,) d_used / d_max of equation 1."""
+    outcomes: Floats
+    """(N,) the task's outcome quantity at the end."""
+    effort: Floats
+    """(N,) mean c_used / c_max of equation 1 over the episode."""
+
+    @property
+    def summary(self) -> dict[str, float]:
+        """The evaluation's columns of a learning curve; `return_se` is the standard error over instances."""
+        count = len(self.returns)
+        spread = float(self.returns.std(ddof=1) / np.sqrt(count)) if count > 1 else 0.0
+        return {
+            "return_mean": float(self.returns.mean()),
+            "return_se": spread,
+            "success_rate": float(self.successes.mean()),
+            "episode_length": float(self.lengths.mean()),
+        }
+
+
+def evaluate(
+    task: Task, policy: Behaviour, tradeoff: Tradeoff | None = None, instances: Floats | None = None
+) -> Evaluation:
+    """Run one episode of `policy` on each of `instances` (N, I), by default the task's fixed ones."""
+    instances = task.evaluation_instances() if instances is None else instances
+    parts = [_play(task, policy, tradeoff, instances[part]) for part in portions(len(instances), task)]
+    return Evaluation(
+        **{field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Evaluation)}
+    )
+
+
+def _play(task: Task, policy: Behaviour, tradeoff: Tradeoff | None, instances: Floats) -> Evaluation:
+    """Run one episode on each of `instances` (N, I) in one simulator."""
+    count = len(instances)
+    slots = np.arange(count)
+    episodes = Episodes(task, count, tradeoff)
+    episodes.begin(slots, instances)
+    designs = np.clip(np.asarray(policy.design(episodes.observation), dtype=np.float64), -1.0, 1.0)
+    episodes.design(slots, designs)
+    returns, lengths, effort = np.zeros(count), np.zeros(count), np.zeros(count)
+    while slots.size:
+        controls = np.asarray(policy.act(episodes.observation[slots]), dtype=np.float64)
+        reward, terminated, truncated = episodes.control(slots, controls)
+        returns[slots] += reward
+        lengths[slots] += 1
+        effort[slots] += task.effort(np.clip(controls, -1.0, 1.0))
+        slots = slots[~(terminated | truncated)]
+    physical = task.design_space.from_unit(designs)
+    return Evaluation(
+        instances=instances,
+        designs=physical,
+        returns=returns,
+        successes=episodes.success(np.arange(count)).copy(),
+        lengths=lengths,
+        outcomes=episodes.simulator.outcome.copy(),
+        material=task.material(physical),
+        effort=effort / np.maximum(lengths, 1.0),
+    )
+
+
+def rows(task: Task, evaluation: Evaluation, cutout: float | None = None) -> Iterator[dict[str, Any]]:
+    """Yield one table row per instance: instance and design by entry name, and the outcome.
+
+    With `cutout`, `in_cutout` tells the instances that were never trained on.
+    """
+    unseen = None if cutout is None else task.in_cutout(evaluation.instances, cutout)
+    for index in range(len(evaluation.returns)):
+        yield {
+            **_named("instance", task.instance_space.names, evaluation.instances[index]),
+            **_named("design", task.design_space.names, evaluation.designs[index]),
+            "return": float(evaluation.returns[index]),
+            "success": int(evaluation.successes[index]),
+            "episode_length": int(evaluation.lengths[index]),
+            "material": float(evaluation.material[index]),
+            "effort": float(evaluation.effort[index]),
+            **({} if unseen is None else {"in_cutout": int(unseen[index])}),
+        }
+
+
+def _named(kind: str, names: tuple[str, ...], values: Floats) -> dict[str, float]:
+    return {f"{kind}_{name}": float(value) for name, value in zip(names, values, strict=True)}

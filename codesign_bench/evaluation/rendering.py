@@ -1,0 +1,167 @@
+"""Pictures of behaviour: a few episodes side by side as an animation, or their moments as one picture.
+
+Shapes: `E` episodes, `T` moments, `O` observation, `D` design, `C` control; a frame is (height, width, 3) in RGB.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from codesign_bench.errors import UserError
+from codesign_bench.storage.files import write_bytes
+from codesign_bench.task import Behaviour, Frame, Singles, Task
+from codesign_bench.task.episodes import Episodes
+
+SUFFIXES = (".gif", ".png")
+FRAMES_PER_SECOND = 15.0
+"""Most frames per second of simulated time; GIFs cannot show many more."""
+END_SECONDS = 1.0
+"""How long an animation stands still at its end, s."""
+MOMENTS = 8
+"""Moments of an episode in one picture, the start and the end included."""
+SHEET_SAMPLES = 40
+"""A picture's moments are chosen among about so many, evenly spread over the horizon."""
+CAPTION_PIXELS = 16
+CAPTION_COLOUR, PAPER = "#202020", "#ffffff"
+
+
+class RandomBehaviour(Behaviour):
+    """Uniformly random tools, and controls that are drawn anew every few steps, so that tools travel."""
+
+    HELD_STEPS = 10
+
+    def __init__(self, task: Task, rng: np.random.Generator) -> None:
+        self.task, self.rng = task, rng
+        self._control: Singles = np.zeros((0, task.control_space.size), dtype=np.float32)
+        self._steps = 0
+
+    def design(self, observation: Singles) -> Singles:
+        """Return random designs."""
+        return self._uniform(observation, self.task.design_space.size)
+
+    def act(self, observation: Singles) -> Singles:
+        """Return random controls, the same for a while."""
+        if self._steps % self.HELD_STEPS == 0 or len(self._control) != len(observation):
+            self._control = self._uniform(observation, self.task.control_space.size)
+        self._steps += 1
+        return self._control
+
+    def _uniform(self, observation: Singles, size: int) -> Singles:
+        return self.rng.uniform(-1.0, 1.0, size=(*observation.shape[:-1], size)).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What is seen at one moment of each of E episodes; of an episode that is over, its end."""
+
+    frames: list[Frame]
+    captions: list[str]
+    over: list[bool]
+    """Whether an episode was over before this moment."""
+
+
+def render(task: Task, behaviour: Behaviour, path: Path, episodes: int = 4) -> str:
+    """Write `behaviour` on the task's first evaluation instances to `path`, a GIF or a PNG; return a line about it.
+
+    Raises:
+        UserError: another suffix, a task without pictures, or a path that cannot be written.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise UserError(f"--out {path}: pictures end in {' or '.join(SUFFIXES)}")
+    animated = path.suffix.lower() == ".gif"
+    stride = _stride(task) if animated else max(1, task.horizon // SHEET_SAMPLES)
+    moments = list(_play(task, behaviour, episodes, stride))
+    solved = sum("success" in caption for caption in moments[-1].captions)
+    content = animation(moments, stride * task.control_period) if animated else _sheet(moments)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(path, content)
+    except OSError as error:
+        raise UserError(f"--out {path}: cannot write there ({error.strerror})") from error
+    return f"{path}: {solved} of {len(moments[-1].captions)} episodes solved"
+
+
+def _play(task: Task, behaviour: Behaviour, count: int, stride: int) -> Iterator[Moment]:
+    """Play the first `count` evaluation instances side by side and yield every `stride`-th step and every end."""
+    instances = task.evaluation_instances()[:count]
+    slots = np.arange(len(instances))
+    episodes = Episodes(task, len(slots))
+    episodes.begin(slots, instances)
+    episodes.design(slots, np.asarray(behaviour.design(episodes.observation), dtype=np.float64))
+    total, active = np.zeros(len(slots)), np.ones(len(slots), dtype=bool)
+    frames: list[Frame] = [_frame(task, episodes, slot) for slot in slots.tolist()]
+    yield Moment(frames, _captions(episodes, total), [False] * len(slots))
+    for step in range(1, task.horizon + 1):
+        running = slots[active]
+        controls = np.asarray(behaviour.act(episodes.observation), dtype=np.float64)[active]
+        reward, terminated, truncated = episodes.control(running, controls)
+        total[running] += reward
+        over = [not running for running in active.tolist()]
+        active[running] = ~(terminated | truncated)
+        if step % stride == 0 or not active[running].all():
+            drawn = {slot: _frame(task, episodes, slot) for slot in running.tolist()}
+            frames = [drawn.get(slot, frame) for slot, frame in enumerate(frames)]
+            yield Moment(frames, _captions(episodes, total), over)
+        if not active.any():
+            return
+
+
+def _frame(task: Task, episodes: Episodes, slot: int) -> Frame:
+    try:
+        return episodes.simulator.render(slot)
+    except NotImplementedError:
+        raise UserError(f"task '{task.name}' draws no pictures") from None
+
+
+def _captions(episodes: Episodes, total: np.ndarray) -> list[str]:
+    ends = [
+        "  success" if success else "  lost" if failure else ""
+        for success, failure in zip(episodes.simulator.success, episodes.simulator.failure, strict=True)
+    ]
+    return [
+        f"step {step}  return {value:.2f}{end}" for step, value, end in zip(episodes.elapsed, total, ends, strict=True)
+    ]
+
+
+def _stride(task: Task) -> int:
+    """Return how many control steps one frame of an animation stands for."""
+    return max(1, round(1.0 / (FRAMES_PER_SECOND * task.control_period)))
+
+
+def animation(moments: list[Moment], period: float) -> bytes:
+    """Return a GIF with a moment every `period` s that stands still at its end."""
+    pictures = [Image.fromarray(np.concatenate(_captioned(moment), axis=1)) for moment in moments]
+    durations = [round(1000.0 * period)] * (len(pictures) - 1) + [round(1000.0 * END_SECONDS)]
+    data = io.BytesIO()
+    first, *rest = [picture.convert("P", palette=Image.Palette.ADAPTIVE) for picture in pictures]
+    first.save(data, "GIF", save_all=True, append_images=rest, duration=durations, loop=0, disposal=1)
+    return data.getvalue()
+
+
+def _sheet(moments: list[Moment]) -> bytes:
+    """Return a PNG with one row per episode, its own moments from start to end beside each other."""
+    pictures = [_captioned(moment) for moment in moments]
+    rows = []
+    for episode in range(len(moments[0].frames)):
+        seen = [index for index, moment in enumerate(moments) if not moment.over[episode]]
+        chosen = np.linspace(0, len(seen) - 1, MOMENTS).round().astype(int)
+        rows.append(np.concatenate([pictures[seen[index]][episode] for index in chosen], axis=1))
+    data = io.BytesIO()
+    Image.fromarray(np.concatenate(rows, axis=0)).save(data, "PNG")
+    return data.getvalue()
+
+
+def _captioned(moment: Moment) -> list[Frame]:
+    """Return every frame of a moment with its caption below."""
+    result = []
+    for frame, text in zip(moment.frames, moment.captions, strict=True):
+        strip = Image.new("RGB", (frame.shape[1], CAPTION_PIXELS), PAPER)
+        ImageDraw.Draw(strip).text((4, 2), text, fill=CAPTION_COLOUR)
+        result.append(np.concatenate([frame, np.asarray(strip)]))
+    return result

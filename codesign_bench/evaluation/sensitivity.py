@@ -1,0 +1,139 @@
+"""How much a tool's design decides: one scripted controller, many tools, many goals.
+
+A task's script controls every tool on every goal; nothing learns. A task whose design matters shows tools that differ
+widely, and no tool that solves every goal. The tables lie beside the cells, one per task, and are measured once.
+
+Shapes: `K` tools, `G` goals (evaluation instances), `D` design.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from codesign_bench.errors import UserError
+from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.seeding import generator
+from codesign_bench.storage.files import write_bytes
+from codesign_bench.storage.results import open_folder
+from codesign_bench.task import EVALUATION_SEED, Behaviour, Floats, Singles, Task, load_task, task_names
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FOLDER = "design_sensitivity"
+RANDOM_TOOLS = 200
+GOALS = 16
+"""The first of the task's evaluation instances."""
+EPISODES_AT_ONCE = 64
+
+RANDOM, SCRIPTED = "random", "scripted"
+"""Kinds of tools: uniform in the design space, or the script's own for one of the goals."""
+
+COLUMNS = ("task", "tool", "kind", "goal", "own", "outcome", "return", "success", "outcome_name", "outcome_unit")
+"""`own` marks a scripted tool on the goal that it was made for."""
+
+
+class GivenTools(Behaviour):
+    """A controller with tools given beforehand, one per episode."""
+
+    def __init__(self, designs: Floats, controller: Behaviour) -> None:
+        self.designs, self.controller = designs.astype(np.float32), controller
+
+    def design(self, observation: Singles) -> Singles:
+        """Return the given designs (B, D), whatever the observation."""
+        return self.designs
+
+    def act(self, observation: Singles) -> Singles:
+        """Return the controller's control."""
+        return self.controller.act(observation)
+
+
+def tools_of(task: Task, goals: Floats, random_tools: int = RANDOM_TOOLS) -> Floats:
+    """Return (K, D) normalised designs: random ones, then the script's own for each of `goals` (G, I)."""
+    rng = generator(EVALUATION_SEED, f"tools for {task.name}")
+    random = rng.uniform(-1.0, 1.0, size=(random_tools, task.design_space.size))
+    episodes_designs = _scripted_designs(task, goals)
+    return np.concatenate([random, episodes_designs])
+
+
+def measure(name: str, random_tools: int = RANDOM_TOOLS, goals: int = GOALS, jobs: int = 1) -> pd.DataFrame:
+    """Return the outcome of every tool on every goal of the task `name`, one row each, with `COLUMNS`.
+
+    Raises:
+        UserError: the task has no script, or tells no outcome.
+    """
+    import pandas as pd
+
+    task = load_task(name)
+    if task.outcome is None:
+        raise UserError(f"task '{name}' tells no outcome")
+    instances = task.evaluation_instances()[:goals]
+    designs = tools_of(task, instances, random_tools)
+    tool, goal = (index.ravel() for index in np.indices((len(designs), len(instances))))
+    parts = np.array_split(np.arange(len(tool)), -(-len(tool) // min(EPISODES_AT_ONCE, task.max_slots)))
+    results = Parallel(n_jobs=jobs)(delayed(_play)(name, designs[tool[part]], instances[goal[part]]) for part in parts)
+    outcome, returns, success = (np.concatenate(values) for values in zip(*results, strict=True))
+    return pd.DataFrame(
+        {
+            "task": name,
+            "tool": tool,
+            "kind": np.where(tool < random_tools, RANDOM, SCRIPTED),
+            "goal": goal,
+            "own": (tool - random_tools == goal).astype(int),
+            "outcome": outcome,
+            "return": returns,
+            "success": success.astype(int),
+            "outcome_name": task.outcome.name,
+            "outcome_unit": task.outcome.unit,
+        },
+        columns=list(COLUMNS),
+    )
+
+
+def load_or_measure(results: Path, say: Callable[[str], None], measure_missing: bool) -> pd.DataFrame:
+    """Return the tables of all tasks below `results`; measure those that are missing, if asked to.
+
+    Raises:
+        UserError: there is none and none may be measured.
+    """
+    import pandas as pd
+
+    frames = []
+    for name in task_names():
+        path = results / FOLDER / f"{name}.csv"
+        if not path.exists() and measure_missing:
+            say(f"{FOLDER}: playing {RANDOM_TOOLS} random tools on {GOALS} goals of {name}; kept in {path}")
+            try:
+                table = measure(name, jobs=os.cpu_count() or 1)
+            except UserError as error:
+                say(f"{FOLDER}: {name} left out: {error}")
+                continue
+            open_folder(results)
+            path.parent.mkdir(exist_ok=True)
+            write_bytes(path, table.to_csv(index=False, lineterminator="\n").encode())
+        if path.exists():
+            frames.append(pd.read_csv(path))
+    if not frames:
+        raise UserError(f"not measured yet; measure it with: codesign-bench plot {FOLDER} --results {results}")
+    return pd.concat(frames, ignore_index=True)
+
+
+def _scripted_designs(task: Task, goals: Floats) -> Floats:
+    from codesign_bench.task.episodes import Episodes
+
+    episodes, slots = Episodes(task, len(goals)), np.arange(len(goals))
+    episodes.begin(slots, goals)
+    return np.asarray(task.script().design(episodes.observation), dtype=np.float64)
+
+
+def _play(name: str, designs: Floats, instances: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return outcome, return and success of one episode per row."""
+    task = load_task(name)
+    evaluation = evaluate(task, GivenTools(designs, task.script()), instances=instances)
+    return evaluation.outcomes, evaluation.returns, evaluation.successes.astype(np.float64)

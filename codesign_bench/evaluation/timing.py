@@ -1,0 +1,78 @@
+"""How long methods took to train, from the cells' own records, and how long their policies take to act, measured now.
+
+Shapes: `O` observation.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from codesign_bench.errors import UserError
+from codesign_bench.storage.policies import load_policy
+from codesign_bench.storage.results import DEFAULT_VARIANT, DONE, find_cells
+from codesign_bench.task import load_task
+from codesign_bench.task.episodes import Episodes
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+CALLS = 200
+"""Calls of a policy that are timed, one observation each."""
+
+
+def timing_frame(results: Path) -> pd.DataFrame:
+    """Return one row per finished cell of the default variant below `results`.
+
+    Columns: task, method, label, seed, profile, env_steps, train_s (training alone, without evaluation), cores (of the
+    cell), cpu, inference_s (median time of one control step's policy call; one seed per task and method is timed, NaN
+    elsewhere).
+
+    Raises:
+        UserError: there is no such cell.
+    """
+    import pandas as pd
+
+    rows = []
+    timed: set[tuple[str, str]] = set()
+    for folder, content in find_cells(results):
+        if content["status"] != DONE or content["variant"] != DEFAULT_VARIANT:
+            continue
+        pair = (content["task"], content["method"])
+        rows.append(
+            {
+                "task": content["task"],
+                "method": content["method"],
+                "label": content.get("label", content["method"]),
+                "seed": content["seed"],
+                "profile": content["profile"],
+                "env_steps": content["env_steps"],
+                "train_s": content["timings"]["train_s"],
+                "cores": content["host"]["threads"],
+                "cpu": content["host"]["cpu"],
+                "inference_s": float("nan") if pair in timed else inference_seconds(folder, content["task"]),
+            }
+        )
+        timed.add(pair)
+    if not rows:
+        raise UserError(f"no finished cell in '{results}' yet; make some with: codesign-bench run --out {results}")
+    return pd.DataFrame(rows)
+
+
+def inference_seconds(folder: Path, task_name: str) -> float:
+    """Return the median time of one call of the cell's policy in the control phase, on one observation, in s."""
+    task, policy = load_task(task_name), load_policy(folder)
+    episodes, slot = Episodes(task, 1), np.array([0])
+    episodes.begin(slot, task.evaluation_instances()[:1])
+    episodes.design(slot, np.asarray(policy.design(episodes.observation), dtype=np.float64))
+    observation = episodes.observation[0].copy()
+    seconds = []
+    for _ in range(CALLS):
+        started = time.perf_counter()
+        policy.act(observation)
+        seconds.append(time.perf_counter() - started)
+    return median(seconds)

@@ -1,0 +1,1 @@
+"""Figures from results: where their numbers come from, and how files are made of them."""

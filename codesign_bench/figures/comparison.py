@@ -1,0 +1,45 @@
+"""Put curves of other results beside one's own: `codesign-bench plot --compare`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from codesign_bench.storage.results import LABEL_COLUMN, load_results
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FROM = " from "
+"""Between a method's name and the folder that its compared results come from."""
+
+
+def with_compared(own: pd.DataFrame, other: Path) -> pd.DataFrame:
+    """Return one's own curves and, below them, those that `other` holds on the same tasks.
+
+    A compared method is called "METHOD from FOLDER", in its label, too, so that figures keep it apart.
+
+    Args:
+        own: rows as `load_results` gives them.
+        other: a results folder.
+
+    Raises:
+        UserError: there are no results in `other`.
+    """
+    import pandas as pd
+
+    compared = load_results(other)
+    compared = compared[compared["task"].isin(set(own["task"]))]
+    origin = FROM + other.resolve().name
+    renamed = {name: compared[name] + origin for name in ("method", LABEL_COLUMN)}
+    return pd.concat([own, compared.assign(**renamed)], ignore_index=True)
+
+
+def method_of(name: str) -> str:
+    """Return the method that a name stands for, wherever its results come from."""
+    return name.partition(FROM)[0]
+
+
+def is_compared(name: str) -> bool:
+    """Tell whether a name stands for results that one's own are compared with."""
+    return FROM in name

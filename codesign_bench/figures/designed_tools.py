@@ -1,0 +1,175 @@
+"""Pictures of the tools that designers made, for goals spread over the goal space, as finished cells recorded them.
+
+Shapes: `N` evaluation instances, `G` goal, `I` instance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codesign_bench.errors import UserError
+from codesign_bench.registry import names
+from codesign_bench.storage.results import load_evaluations
+from codesign_bench.task import Box, Floats, Frame, Task, load_task
+from codesign_bench.task.episodes import Episodes
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MAP_SIDE = 3
+"""Goals of two or more entries: the first two are cut into so many stretches each, with one picture per field."""
+LINE_LENGTH = 8
+"""Goals of one entry: most pictures, all in one row."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Which evaluation instance is drawn, and where in a grid; row 0 is the top."""
+
+    instance: int
+    row: int
+    column: int
+
+
+def designed_tools(results: Path, say: Callable[[str], None]) -> pd.DataFrame:
+    """Return pictures of the tools of one designer per task and variant, right after the design step.
+
+    Variants are `default` and those of the trade-off. The designer is the first method in the order of methods that
+    has a finished cell there, with its lowest seed, so that nobody chose it by its results.
+
+    Returns:
+        The columns of `load_evaluations`, one row per picture, with `title` (the task's), `row` and `column` (place in
+        the task's grid), `across` and `up` (what changes along columns and, from below, along rows; `up` is empty where
+        goals have one entry), `goal` (that goal in words) and `picture` (height, width, 3).
+
+    Raises:
+        UserError: no finished cell can be drawn.
+    """
+    import pandas as pd
+
+    frame = load_evaluations(results)
+    frame = frame[frame["variant"].str.fullmatch(r"default|alpha-[\d.]+")]
+    parts = []
+    for (name, _), rows in frame.groupby(["task", "variant"], sort=False):
+        try:
+            parts.append(_pictures(load_task(str(name)), _one_cell(rows)))
+        except UserError as error:
+            say(f"tools for {name} left out: {error}")
+    if not parts:
+        raise UserError(f"no finished cell in '{results}' whose tools can be drawn")
+    return pd.concat(parts, ignore_index=True)
+
+
+def spread(goals: Floats) -> list[Place]:
+    """Choose instances that cover the goals (N, G), at most one per field of an even grid, nearest to its centre.
+
+    Goals of one entry make a line from low to high, with one instance per value where these are few; goals of more
+    make a map of their first two entries, the second upwards. Fields without goals stay empty on a map and are passed
+    over on a line.
+    """
+    goals = np.asarray(goals, dtype=np.float64)
+    if goals.shape[1] == 1:
+        chosen = _along_a_line(goals[:, 0])
+        return [Place(instance, 0, position) for position, instance in enumerate(chosen)]
+    (column, x), (row, y) = (_stretches(goals[:, entry], MAP_SIDE) for entry in (0, 1))
+    result = []
+    for field_x, field_y in product(range(MAP_SIDE), repeat=2):
+        members = np.flatnonzero((column == field_x) & (row == field_y))
+        if members.size:
+            nearest = members[np.maximum(x[members], y[members]).argmin()]
+            result.append(Place(int(nearest), MAP_SIDE - 1 - field_y, field_x))
+    return sorted(result, key=lambda place: (place.row, place.column))
+
+
+def _along_a_line(values: Floats) -> list[int]:
+    distinct = np.unique(values)
+    if len(distinct) <= LINE_LENGTH:
+        return [int(np.flatnonzero(values == value)[0]) for value in distinct]
+    stretch, off_middle = _stretches(values, LINE_LENGTH)
+    members = [np.flatnonzero(stretch == position) for position in range(LINE_LENGTH)]
+    return [int(own[off_middle[own].argmin()]) for own in members if own.size]
+
+
+def _stretches(values: Floats, count: int) -> tuple[NDArray[np.int_], Floats]:
+    """Return in which of `count` stretches of their range values (N,) lie, and how far from its middle."""
+    low, high = values.min(), values.max()
+    place = count * (values - low) / max(high - low, 1e-12)
+    stretch = np.minimum(place.astype(np.int_), count - 1)
+    return stretch, np.abs(place - stretch - 0.5)
+
+
+def _one_cell(rows: pd.DataFrame) -> pd.DataFrame:
+    present = set(rows["method"])
+    method = next((name for name in names("methods") if name in present), min(present))
+    own = rows[rows["method"] == method]
+    return own[own["seed"] == own["seed"].min()]
+
+
+def _pictures(task: Task, cell: pd.DataFrame) -> pd.DataFrame:
+    import pandas as pd
+
+    instances = _entries(cell, "instance", task.instance_space)
+    designs = _entries(cell, "design", task.design_space)
+    goals, space = instances[:, : task.goal_size], task.goal_space
+    places = spread(goals)
+    chosen = [place.instance for place in places]
+    return (
+        cell.iloc[chosen]
+        .assign(
+            title=task.title,
+            row=[place.row for place in places],
+            column=[place.column for place in places],
+            across=_words(space.names[0]),
+            up=_words(space.names[1]) if space.size > 1 else "",
+            goal=[_describe(space, goal) for goal in goals[chosen]],
+        )
+        .assign(picture=pd.Series(_draw(task, instances[chosen], designs[chosen]), index=cell.index[chosen]))
+    )
+
+
+def _entries(cell: pd.DataFrame, kind: str, space: Box) -> Floats:
+    """Return the columns of a space's entries as (N, size).
+
+    Raises:
+        UserError: the cell was made by another version of the task.
+    """
+    columns = [f"{kind}_{name}" for name in space.names]
+    missing = [column for column in columns if column not in cell.columns]
+    if missing:
+        raise UserError(f"its evaluation lacks {', '.join(missing)}; was the task another one then?")
+    values: Floats = cell[columns].to_numpy(dtype=np.float64)
+    return values
+
+
+def _draw(task: Task, instances: Floats, designs: Floats) -> list[Frame]:
+    """Return a picture of each instance (N, I) with its tool."""
+    frames = []
+    slot, episodes = np.array([0]), Episodes(task, 1)
+    for instance, design in zip(instances, task.design_space.to_unit(designs), strict=True):
+        episodes.begin(slot, instance[None])
+        episodes.design(slot, design[None])
+        try:
+            frames.append(episodes.simulator.render(0))
+        except NotImplementedError:
+            raise UserError(f"task '{task.name}' draws no pictures") from None
+    return frames
+
+
+def _describe(space: Box, goal: Floats) -> str:
+    """Return a goal in words, e.g. "goal x: 14.2 m, goal y: 4.04 m"."""
+    units = [
+        "" if unit == "1" or unit in name else f" {unit}" for name, unit in zip(space.names, space.units, strict=True)
+    ]
+    entries = zip(space.names, goal, units, strict=True)
+    return ", ".join(f"{_words(name)}: {value:.3g}{unit}" for name, value, unit in entries)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")

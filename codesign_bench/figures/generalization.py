@@ -1,0 +1,147 @@
+"""What policies reach on goals and starts that they were never trained on (paper, section 5.2).
+
+Shapes: `N` evaluation instances, `P` places, `I` instance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from codesign_bench.errors import UserError
+from codesign_bench.evaluation.extrapolation import load_or_measure
+from codesign_bench.storage.results import DEFAULT_VARIANT, load_evaluations
+from codesign_bench.task import Floats, Task, load_task
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import NDArray
+
+TRAINING, CUTOUT, OUTSIDE = "training", "cutout", "outside"
+"""Regions of positions: trained on, cut out of what is trained on, and beyond both."""
+START, PLACE = "start", "place"
+"""Kinds of rows: an evaluation instance with its outcome, or a place of a fine grid, which tells regions apart."""
+
+WHOLE_REGION = 1.0 + 1e-9
+"""The cutout of this fraction is the whole training region, its borders included."""
+ROOM = 0.15
+"""How far the grid of places reaches beyond the training region, as a share of its extent."""
+PLACES = 14_400
+"""Places of a grid, however many axes it has."""
+
+
+def outcomes_by_region(results: Path, say: Callable[[str], None], measure: bool = False) -> pd.DataFrame:
+    """Return the evaluations of all cells with a cutout, and the places that tell where the regions lie.
+
+    Cells of the same method and task that trained on the whole region stand beside them as fraction 0. What policies
+    reach around the training region, which no evaluation tells, is added as far as it was measured.
+
+    Args:
+        results: a results folder.
+        say: is told what is left out or measured.
+        measure: play the policies around the training region that were not played there yet.
+
+    Returns:
+        Rows of kind `START`: the columns of `load_evaluations`; rows of kind `PLACE`: task and cutout. Both have kind,
+        region, x and y (the position; y is NaN where positions have one entry), x_label, y_label.
+
+    Raises:
+        UserError: no finished cell has a cutout.
+    """
+    import pandas as pd
+
+    frame = load_evaluations(results)
+    with_cutout = frame[frame["variant"].str.fullmatch(r"cutout-[\d.]+")]
+    pairs = with_cutout[["task", "method"]].drop_duplicates()
+    whole = frame[frame["variant"] == DEFAULT_VARIANT].merge(pairs).assign(cutout=0.0)
+    parts = []
+    inside = pd.concat([whole, with_cutout])
+    for name, rows in pd.concat([inside, *_around(results, inside, say, measure)]).groupby("task", sort=False):
+        try:
+            task = load_task(str(name))
+            parts.append(_starts(task, rows))
+            parts += [_places(task, float(fraction)) for fraction in np.unique(rows["cutout"])]
+        except UserError as error:
+            say(f"generalisation on {name} left out: {error}")
+    if not parts:
+        raise UserError(
+            f"no finished cell with a cutout in '{results}'; make some with: codesign-bench run --cutout 0.6"
+        )
+    return pd.concat(parts, ignore_index=True)
+
+
+def _around(results: Path, inside: pd.DataFrame, say: Callable[[str], None], measure: bool) -> Iterator[pd.DataFrame]:
+    """Yield for every task, method and variant of `inside` what its policies reach around the training region."""
+    told = ["task", "method", "label", "variant", "cutout"]
+    for task, method, label, variant, cutout in inside[told].drop_duplicates().itertuples(index=False):
+        try:
+            table = load_or_measure(results, [(task, method)], say, measure, variant)
+        except UserError as error:
+            if measure:  # otherwise it is just not measured yet: the region then has no line
+                say(f"around the region, {task}/{method}/{variant} left out: {error}")
+            continue
+        yield table.assign(label=label, variant=variant, cutout=cutout)
+
+
+def regions(task: Task, instances: Floats, fraction: float) -> NDArray[np.str_]:
+    """Return the region of each instance (N, I) when `fraction` of the training region is cut out; 0 cuts out none.
+
+    Raises:
+        UserError: the task has no positions.
+    """
+    inside = task.in_cutout(instances, WHOLE_REGION)
+    unseen = task.in_cutout(instances, fraction) if fraction > 0.0 else np.zeros(len(instances), dtype=bool)
+    return np.where(unseen, CUTOUT, np.where(inside, TRAINING, OUTSIDE))
+
+
+def _starts(task: Task, rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the evaluation rows of one task with their regions and positions."""
+    import pandas as pd
+
+    columns = [f"instance_{name}" for name in task.instance_space.names]
+    missing = [column for column in columns if column not in rows.columns]
+    if missing:
+        raise UserError(f"its evaluations lack {', '.join(missing)}; was the task another one then?")
+    parts = []
+    for fraction, group in rows.groupby("cutout"):
+        instances = group[columns].to_numpy(dtype=np.float64)
+        region = regions(task, instances, float(str(fraction)))
+        parts.append(group.assign(kind=START, region=region, **_positions(task, instances)))
+    return pd.concat(parts)
+
+
+def _places(task: Task, fraction: float) -> pd.DataFrame:
+    """Return a grid of positions around the training region of one task, with their regions."""
+    import pandas as pd
+
+    space = task.instance_space
+    entries = min(2, task.goal_size)
+    low, high = space.bounds
+    room = ROOM * (high - low)[:entries]
+    count = round(PLACES ** (1.0 / entries))
+    axes = [
+        np.linspace(start - extra, stop + extra, count) for start, stop, extra in zip(low, high, room, strict=False)
+    ]
+    places = np.stack([axis.ravel() for axis in np.meshgrid(*axes)], axis=1)
+    instances = np.tile(0.5 * (low + high), (len(places), 1))
+    instances[:, :entries] = places
+    region = regions(task, instances, fraction)
+    return pd.DataFrame(
+        {"task": task.name, "cutout": fraction, "kind": PLACE, "region": region, **_positions(task, instances)}
+    )
+
+
+def _positions(task: Task, instances: Floats) -> dict[str, Floats | str]:
+    """Return the position of each instance (P, I): its first entries, one or two, with their labels."""
+    space = task.goal_space
+    labels = [f"{name.replace('_', ' ')} ({unit})" for name, unit in zip(space.names, space.units, strict=True)]
+    two = space.size > 1
+    return {
+        "x": instances[:, 0],
+        "y": instances[:, 1] if two else np.full(len(instances), np.nan),
+        "x_label": labels[0],
+        "y_label": labels[1] if two else "",
+    }

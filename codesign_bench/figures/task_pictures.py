@@ -1,0 +1,73 @@
+"""Pictures of tasks: a moment of each task's script at work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from codesign_bench.errors import UserError
+from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.task import Task, load_task
+from codesign_bench.task.episodes import Episodes
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TRIED = 6
+"""The first of a task's evaluation instances, of which the one with the highest return is drawn."""
+MOMENT = 0.6
+"""Which share of the episode has passed: the tool has met the object and has not finished."""
+
+
+def tasks_at_work(task_names: Iterable[str], say: Callable[[str], None]) -> pd.DataFrame:
+    """Return one picture of each task.
+
+    Returns:
+        Columns task, title, instance (its number), step (of the picture), steps (of the whole episode), return and
+        success (at its end), picture (height, width, 3).
+
+    Raises:
+        UserError: no task can be drawn.
+    """
+    import pandas as pd
+
+    rows = []
+    for name in task_names:
+        try:
+            rows.append(_at_work(load_task(name)))
+        except UserError as error:
+            say(f"picture of {name} left out: {error}")
+    if not rows:
+        raise UserError("no task here has both a script and pictures")
+    return pd.DataFrame(rows)
+
+
+def _at_work(task: Task) -> dict[str, Any]:
+    """Return the row of a task."""
+    script = task.script()
+    instances = task.evaluation_instances()[:TRIED]
+    evaluation = evaluate(task, script, instances=instances)
+    best = int(evaluation.returns.argmax())
+    steps = int(evaluation.lengths[best])
+    step = max(1, round(MOMENT * steps))
+    slot, episodes = np.array([0]), Episodes(task, 1)
+    episodes.begin(slot, instances[best : best + 1])
+    episodes.design(slot, np.asarray(script.design(episodes.observation), dtype=np.float64))
+    for _ in range(step):
+        episodes.control(slot, np.asarray(script.act(episodes.observation), dtype=np.float64))
+    try:
+        picture = episodes.simulator.render(0)
+    except NotImplementedError:
+        raise UserError(f"task '{task.name}' draws no pictures") from None
+    return {
+        "task": task.name,
+        "title": task.title,
+        "instance": best,
+        "step": step,
+        "steps": steps,
+        "return": float(evaluation.returns[best]),
+        "success": int(evaluation.successes[best]),
+        "picture": picture,
+    }

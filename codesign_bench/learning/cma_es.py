@@ -1,0 +1,112 @@
+"""CMA-ES by pycma (Hansen), with a state that can be saved without pickle.
+
+Shapes: `P` candidates of a generation, `X` parameters.
+
+All of pycma's state follows from its random numbers and from the fitness values that it was told. So its state on disk
+is the fitness history: going on means asking and telling the same generations again, which gives the same numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any
+
+import cma
+import numpy as np
+
+from codesign_bench.config.validation import check_range
+from codesign_bench.learning.profiles import sourced
+from codesign_bench.studies.corl2023.learners import CMA_ES_SWEEP
+from codesign_bench.task import Floats
+
+PYCMA = {"source": "pycma's default"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvolutionConfig:
+    """Hyperparameters of CMA-ES; the four learning rates are pycma's options of the same meaning."""
+
+    popsize: int = 24
+    """Candidates of a generation."""
+    sigma0: float = 0.1
+    """Initial standard deviation; parameters lie in [-1, 1]."""
+    center_learning_rate: float = field(default=1.0, metadata=PYCMA)
+    """Learning rate of the mean (pycma's `CMA_cmean`)."""
+    covariance_learning_rate: float = field(default=1.0, metadata=PYCMA)
+    """Multiplier of the covariance update (pycma's `CMA_on`)."""
+    rank_mu_learning_rate: float = field(default=1.0, metadata=PYCMA)
+    """Multiplier of the rank-mu update (pycma's `CMA_rankmu`)."""
+    rank_one_learning_rate: float = field(default=1.0, metadata=PYCMA)
+    """Multiplier of the rank-one update (pycma's `CMA_rankone`)."""
+
+    def __post_init__(self) -> None:
+        check_range(self, 2, inf, "popsize")  # pycma's own limit
+        check_range(self, 1e-12, inf, "sigma0")
+        check_range(self, 0, 1, "center_learning_rate", "covariance_learning_rate")
+        check_range(self, 0, 1, "rank_mu_learning_rate", "rank_one_learning_rate")
+
+
+def paper_evolution() -> dict[str, tuple[Any, str]]:
+    """Return the settings that came out best in the paper's sweep."""
+    sweep = CMA_ES_SWEEP
+    best = {
+        "popsize": int(sweep.population_size.best),
+        "sigma0": sweep.sigma0.best,
+        "center_learning_rate": sweep.center_learning_rate.best,
+        "covariance_learning_rate": sweep.covariance_learning_rate.best,
+        "rank_mu_learning_rate": sweep.rank_mu_learning_rate.best,
+        "rank_one_learning_rate": sweep.rank_one_learning_rate.best,
+    }
+    return sourced(best, "paper, table of baseline hyperparameters (bold)")
+
+
+class Evolution:
+    """Maximises a fitness over [-1, 1]^X, one generation after the other."""
+
+    def __init__(self, size: int, config: EvolutionConfig, rng: np.random.Generator) -> None:
+        own = rng.spawn(1)[0]  # Its own generator, so that nothing else shifts what a replay draws.
+        options = {
+            "popsize": config.popsize,
+            "bounds": [-1.0, 1.0],
+            "CMA_cmean": config.center_learning_rate,
+            "CMA_on": config.covariance_learning_rate,
+            "CMA_rankmu": config.rank_mu_learning_rate,
+            "CMA_rankone": config.rank_one_learning_rate,
+            "randn": lambda *shape: own.standard_normal(shape),
+            "seed": np.nan,
+            "verbose": -9,
+            "verb_log": 0,
+            "verb_disp": 0,
+        }
+        self._strategy = cma.CMAEvolutionStrategy(np.zeros(size), config.sigma0, options)
+        self._asked: list[Any] | None = None
+        self.history: list[list[float]] = []
+
+    def ask(self) -> Floats:
+        """Return the candidates (P, X) of the generation at hand; asking again before `tell` returns the same."""
+        if self._asked is None:
+            self._asked = self._strategy.ask()
+        return np.array(self._asked)
+
+    def tell(self, fitness: Floats) -> None:
+        """End the generation with the fitness (P,) of its candidates; larger is better."""
+        self.ask()
+        self._strategy.tell(self._asked, (-fitness).tolist())
+        self.history.append(fitness.tolist())
+        self._asked = None
+
+    @property
+    def mean(self) -> Floats:
+        """The distribution's mean (X,), inside the bounds."""
+        return np.array(self._strategy.result.xfavorite)
+
+    @property
+    def sigma(self) -> float:
+        """The distribution's overall standard deviation."""
+        return float(self._strategy.sigma)
+
+    def replay(self, history: Floats) -> None:
+        """Go through generations with the fitness (generations, P) again, on a fresh object with the same generator."""
+        for fitness in history:
+            self.tell(fitness)

@@ -1,0 +1,10 @@
+"""What a method is; everything that a new method needs is imported from here.
+
+`problem.py` is what it is asked to learn, `method.py` the method itself, `loading.py` methods by name.
+"""
+
+from codesign_bench.method.loading import load_method, method_names
+from codesign_bench.method.method import Array, BatchReport, Method, Policy, State
+from codesign_bench.method.problem import Problem
+
+__all__ = ["Array", "BatchReport", "Method", "Policy", "Problem", "State", "load_method", "method_names"]

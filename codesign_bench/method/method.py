@@ -1,0 +1,114 @@
+"""What a method is: it learns in batches, hands out its current policy, and can be saved and put back.
+
+Shapes: `B` batch (may be absent), `O` observation, `D` design, `C` control.
+A new method is one file in `methods/` with one public subclass of `Method`. The runner owns budget, evaluation,
+checkpoints, seeds and progress; a method only learns.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, TypeVar
+
+from numpy.typing import NDArray
+
+from codesign_bench.errors import UserError
+from codesign_bench.method.problem import Problem
+from codesign_bench.seeding import Streams
+from codesign_bench.task import Behaviour, Task
+
+Array = NDArray[Any]
+
+
+class Policy(Behaviour):
+    """A trained designer and controller that act with their means, as evaluation and everything after it uses them."""
+
+    @abstractmethod
+    def tensors(self) -> dict[str, Array]:
+        """Return all numbers that the policy needs, by name; `Method.make_policy` takes them back."""
+
+
+@dataclass
+class State:
+    """All that a method needs to go on exactly where it stood: arrays by name, and JSON values."""
+
+    arrays: dict[str, Array]
+    values: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class BatchReport:
+    """What one `Method.train` call did."""
+
+    env_steps: int
+    """Simulated environment steps, design steps and every candidate's included."""
+    metrics: dict[str, float]
+    """Logged values by name, each explained on the method's page."""
+    gradient_steps: int = 0
+    """Gradient steps that changed the policy."""
+
+
+ConfigType = TypeVar("ConfigType")
+
+
+class Method(ABC, Generic[ConfigType]):
+    """A way of learning a tool's design together with its control, from task reward alone."""
+
+    name: ClassVar[str]
+    """Its name, which is its file's name."""
+    label: ClassVar[str]
+    """Its name in figures."""
+    config_class: ClassVar[type]
+    """Frozen dataclass of its hyperparameters; each field's default is total, so that any task runs with it."""
+
+    def __init__(self, problem: Problem, config: ConfigType, streams: Streams) -> None:
+        self.problem = problem
+        self.config = config
+        self.streams = streams
+
+    @classmethod
+    @abstractmethod
+    def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
+        """Return what `profile` sets for the task: key -> (value, source); unknown tasks get its general values."""
+
+    def use_cores(self, count: int) -> None:
+        """Use up to `count` cores from now on; no number may depend on it. By default a method uses one."""
+
+    def use_device(self, name: str) -> None:
+        """Compute updates on the device `name` ("cpu", "cuda") from now on. By default a method has no use for one."""
+
+    def start_from(self, tensors: Mapping[str, Array]) -> None:
+        """Take over a trained policy, as `Policy.tensors` described it, before any training.
+
+        Raises:
+            UserError: the method cannot.
+        """
+        raise UserError(f"method '{self.name}' cannot go on from a trained policy")
+
+    @abstractmethod
+    def train(self, remaining_steps: int) -> BatchReport:
+        """Collect one batch and learn from it.
+
+        Args:
+            remaining_steps: environment steps left in the budget; the batch is about min(batch size, remaining steps)
+                long, in whole episodes.
+        """
+
+    @abstractmethod
+    def policy(self) -> Policy:
+        """Return the policy as it stands; later training may change it."""
+
+    @classmethod
+    @abstractmethod
+    def make_policy(cls, task: Task, config: ConfigType, tensors: Mapping[str, Array]) -> Policy:
+        """Return the policy that `Policy.tensors` described."""
+
+    @abstractmethod
+    def state(self) -> State:
+        """Return what `load_state` needs to go on bit for bit; the runner saves the random streams."""
+
+    @abstractmethod
+    def load_state(self, state: State) -> None:
+        """Go on from `state`; called on a freshly built method with the same problem, config and seed."""

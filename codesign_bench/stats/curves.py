@@ -1,0 +1,99 @@
+"""Learning curves of several seeds: their final values, and statistics along the environment steps; frames in and out.
+
+Shapes: `N` seeds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from scipy.stats import trim_mean
+
+from codesign_bench.stats.bootstrap import bootstrap, interquartile_means
+from codesign_bench.stats.summaries import mean, standard_error
+
+CELL_KEYS = ["task", "method", "variant"]
+"""Columns that identify what is compared; the rows of one such group and one seed are one curve."""
+
+
+def final_values(frame: pd.DataFrame, column: str, *, last: int = 1) -> pd.DataFrame:
+    """Return each curve's final value of `column`: the mean over its last `last` evaluations.
+
+    Args:
+        frame: rows as `codesign_bench.load_results` gives them.
+        column: e.g. "return_mean".
+        last: evaluations to average; more of them damp the noise of a single one.
+
+    Returns:
+        One row per curve: task, method, variant, seed, env_steps (of the last evaluation), and `column`.
+    """
+    ordered = frame.dropna(subset=[column]).sort_values("env_steps", kind="stable")
+    tails = ordered.groupby([*CELL_KEYS, "seed"]).tail(last)
+    return tails.groupby([*CELL_KEYS, "seed"], as_index=False).agg({"env_steps": "max", column: "mean"})
+
+
+def on_common_grid(frame: pd.DataFrame, column: str) -> pd.DataFrame:
+    """Put the curves of all seeds of each task, method and variant on the same environment steps.
+
+    The grid of a group is every step count at which any of its seeds was evaluated. Between two evaluations of a seed
+    the value is interpolated; outside of them the seed does not count, so that a curve which ended early is never
+    drawn on, and the number of seeds falls along the axis of a partial sweep.
+
+    Args:
+        frame: rows as `codesign_bench.load_results` gives them.
+        column: e.g. "return_mean".
+
+    Returns:
+        Columns task, method, variant, seed, env_steps, and `column`.
+    """
+    known = frame.dropna(subset=[column])
+    columns = [*CELL_KEYS, "seed", "env_steps", column]
+    parts = [_group_on_grid(group, column) for _, group in known.groupby(CELL_KEYS, sort=False)]
+    return pd.concat(parts, ignore_index=True)[columns] if parts else known[columns]
+
+
+def _group_on_grid(group: pd.DataFrame, column: str) -> pd.DataFrame:
+    """Return one group's curves on the union of their environment steps."""
+    grid = np.unique(group["env_steps"].to_numpy(dtype=np.float64))
+    parts = []
+    for seed, curve in group.groupby("seed"):
+        ordered = curve.drop_duplicates("env_steps", keep="last").sort_values("env_steps")
+        steps = ordered["env_steps"].to_numpy(dtype=np.float64)
+        inside = grid[(grid >= steps[0]) & (grid <= steps[-1])]
+        values = np.interp(inside, steps, ordered[column].to_numpy(dtype=np.float64))
+        parts.append(pd.DataFrame({"seed": seed, "env_steps": inside, column: values}))
+    return pd.concat(parts).assign(**{key: group[key].iloc[0] for key in CELL_KEYS})
+
+
+def curve_statistics(frame: pd.DataFrame, column: str) -> pd.DataFrame:
+    """Return mean, standard error and number of seeds of `column` over seeds, along the environment steps.
+
+    Returns:
+        Columns task, method, variant, env_steps, mean, standard_error, seeds.
+    """
+    grouped = on_common_grid(frame, column).groupby([*CELL_KEYS, "env_steps"])[column]
+    return grouped.agg(mean=mean, standard_error=standard_error, seeds="count").reset_index()
+
+
+def curve_intervals(frame: pd.DataFrame, column: str, rng: np.random.Generator) -> pd.DataFrame:
+    """Return interquartile mean, its bootstrap interval and number of seeds of `column`, along the environment steps.
+
+    Whole curves are resampled, so that a resample means the same seeds at every step that the same seeds reached.
+
+    Returns:
+        Columns task, method, variant, env_steps, interquartile_mean, low, high (NaN below three seeds), seeds.
+    """
+    parts = []
+    for keys, group in on_common_grid(frame, column).groupby(CELL_KEYS):
+        curves = group.pivot(index="env_steps", columns="seed", values=column)
+        for reached, stretch in curves.groupby([curves[seed].notna() for seed in curves]):
+            values = stretch.to_numpy()[:, np.array(reached)].T
+            low, high = bootstrap([values], interquartile_means, rng)
+            table = {
+                "env_steps": stretch.index,
+                "interquartile_mean": trim_mean(values, 0.25),
+                "low": low,
+                "high": high,
+            }
+            parts.append(pd.DataFrame({**dict(zip(CELL_KEYS, keys, strict=True)), **table, "seeds": len(values)}))
+    return pd.concat(parts).sort_values([*CELL_KEYS, "env_steps"], kind="stable", ignore_index=True)

@@ -1,0 +1,139 @@
+"""The paper's grid of CMA-ES settings, searched on a budget by successive halving (Jamieson & Talwalkar 2016).
+
+The grid has 972 settings. A random part of it, the paper's best among them, starts; after every rung the better third
+goes on with three times the budget. Settings are judged by the return of CMA-ES's mean on the evaluation instances.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from codesign_bench.config.resolve import resolve
+from codesign_bench.errors import UserError
+from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.method import Problem, load_method
+from codesign_bench.seeding import Streams, generator
+from codesign_bench.storage.files import write_bytes
+from codesign_bench.storage.results import open_folder
+from codesign_bench.studies.corl2023.learners import CMA_ES_SWEEP, Swept
+from codesign_bench.task import load_task
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FOLDER = "baseline_sweep"
+TASK, METHOD = "push", "cma_es"
+SEED = 0
+"""Of the random part of the grid, and of every run."""
+REDUCTION = 3
+"""A rung keeps one setting in three and triples their budget."""
+
+KEYS: dict[str, Swept] = {
+    "popsize": CMA_ES_SWEEP.population_size,
+    "sigma0": CMA_ES_SWEEP.sigma0,
+    "center_learning_rate": CMA_ES_SWEEP.center_learning_rate,
+    "covariance_learning_rate": CMA_ES_SWEEP.covariance_learning_rate,
+    "rank_mu_learning_rate": CMA_ES_SWEEP.rank_mu_learning_rate,
+    "rank_one_learning_rate": CMA_ES_SWEEP.rank_one_learning_rate,
+}
+"""Hyperparameter of the method -> what the paper tested."""
+COLUMNS = ("task", "rung", "budget", *KEYS, "paper_best", "env_steps", "return_mean", "kept")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How much a profile spends."""
+
+    settings: int
+    """That start."""
+    budget: int
+    """Environment steps of the first rung."""
+
+
+PLANS = {"quick": Plan(18, 10_000), "laptop": Plan(81, 50_000), "paper": Plan(972, 100_000)}
+
+
+def settings_of(count: int) -> list[dict[str, float]]:
+    """Return `count` settings of the grid, the paper's best first, the others at random."""
+    grid = [dict(zip(KEYS, values, strict=True)) for values in product(*(swept.tested for swept in KEYS.values()))]
+    best = {name: swept.best for name, swept in KEYS.items()}
+    others = [setting for setting in grid if setting != best]
+    order = generator(SEED, "settings").permutation(len(others))
+    return [best, *(others[index] for index in order[: count - 1])]
+
+
+def sweep_baseline(results: Path, profile: str, say: Callable[[str], None]) -> pd.DataFrame:
+    """Search, unless `results` holds the table already; return the table, one row per setting and rung.
+
+    Raises:
+        UserError: the folder cannot be written.
+    """
+    import pandas as pd
+
+    path = results / FOLDER / f"{TASK}-{profile}.csv"
+    if path.exists():
+        return pd.read_csv(path)
+    plan, rows = PLANS[profile], list[dict[str, Any]]()
+    alive, budget, rung = settings_of(plan.settings), plan.budget, 0
+    while len(alive) > 1:
+        say(f"{FOLDER}: {len(alive)} settings of {METHOD} with {budget:,} steps each on {TASK}")
+        found = Parallel(n_jobs=os.cpu_count() or 1)(delayed(_judge)(setting, budget) for setting in alive)
+        order = np.argsort([-value for _, value in found], kind="stable")
+        keep = set(order[: len(alive) // REDUCTION].tolist())
+        for index, (setting, (env_steps, value)) in enumerate(zip(alive, found, strict=True)):
+            rows.append(
+                {
+                    "task": TASK,
+                    "rung": rung,
+                    "budget": budget,
+                    **setting,
+                    "paper_best": int(all(setting[name] == swept.best for name, swept in KEYS.items())),
+                    "env_steps": env_steps,
+                    "return_mean": value,
+                    "kept": int(index in keep),
+                }
+            )
+        alive = [alive[index] for index in order if index in keep]
+        budget, rung = budget * REDUCTION, rung + 1
+    open_folder(results)
+    path.parent.mkdir(exist_ok=True)
+    table = pd.DataFrame(rows, columns=list(COLUMNS))
+    write_bytes(path, table.to_csv(index=False, lineterminator="\n").encode())
+    return table
+
+
+def load_sweep(results: Path) -> pd.DataFrame:
+    """Return the table of the most thorough sweep below `results`.
+
+    Raises:
+        UserError: there is none.
+    """
+    import pandas as pd
+
+    for profile in reversed(PLANS):
+        path = results / FOLDER / f"{TASK}-{profile}.csv"
+        if path.exists():
+            return pd.read_csv(path)
+    raise UserError(
+        f"no sweep in '{results}' yet; make one with: codesign-bench reproduce baseline_sweep --out {results}"
+    )
+
+
+def _judge(setting: dict[str, float], budget: int) -> tuple[int, float]:
+    """Train with one setting; return the steps taken and the final return."""
+    method_class: Any = load_method(METHOD)
+    config = replace(resolve(method_class, TASK, "laptop").method, **{**setting, "popsize": int(setting["popsize"])})
+    problem = Problem(load_task(TASK))
+    method = method_class(problem, config, Streams(SEED))
+    steps = 0
+    while steps < budget:
+        steps += method.train(budget - steps).env_steps
+    return steps, float(evaluate(problem.task, method.policy()).returns.mean())

@@ -1,0 +1,207 @@
+"""The paper's claims, in the order of its sections; a new claim is one more entry.
+
+Sentences are ours, close to the paper's; figures are named by their LaTeX labels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from codesign_bench.claims import comparison, deployment, fine_tuning, tools, tradeoff, zero_shot
+from codesign_bench.claims.claim import Claim
+from codesign_bench.claims.statistics import run_command
+from codesign_bench.studies.corl2023.protocol import PROTOCOL
+from codesign_bench.studies.corl2023.scenes import SCENES
+
+OURS, SHARED = "gnn_ppo", "shared_arch"
+PRIOR = ("cma_rl", "hwasp_minimal", "cma_es")
+"""Prior methods and baselines; the ablation `SHARED` is not one of them."""
+TASKS = tuple(SCENES)
+SEEDS = {task: PROTOCOL.seeds_for(task) for task in TASKS}
+
+EFFICIENCY = "Evaluating sample efficiency; fig:sample_efficiency"
+TOOLS = "Evaluating sample efficiency; fig:qualitative_tools"
+ENVIRONMENTS = "Experiments, simulated environments; tab:real_exp for fetch cube"
+ZERO_SHOT = "Generalization to unseen task variations, zero-shot; fig:interpolation_curve"
+FINE_TUNING = "Generalization to unseen task variations, fine-tuning; fig:finetuning"
+REAL = "Evaluation on a real robot; tab:real_exp, fig:detailed_other_inits_results"
+TRADEOFF = "Trading off design and control complexity; fig:control_design_ratio"
+
+FETCH = "fetch_cube"
+LIFT = "lift_cup"
+CATCH = "catch_balls"
+FRACTIONS, ALPHAS = PROTOCOL.cutout_fractions, PROTOCOL.alphas
+FEW_SEEDS = PROTOCOL.seeds_generalisation
+
+OUTSIDE = ((FETCH, OURS),)
+"""Tasks and methods that are measured outside the training region."""
+
+
+def _listed(option: str, values: tuple[float, ...]) -> str:
+    return f" --{option} {' '.join(f'{value:g}' for value in values)}"
+
+
+CUTOUTS = run_command(OURS, FETCH, FEW_SEEDS, _listed("cutout", FRACTIONS))
+TRADEOFFS = run_command(OURS, CATCH, FEW_SEEDS, _listed("alpha", ALPHAS))
+STARTS = tuple(range(1, len(PROTOCOL.fine_tuning_starts) + 1))
+FINE_TUNED = (
+    run_command(OURS, FETCH, FEW_SEEDS),
+    run_command(OURS, FETCH, FEW_SEEDS, _listed("finetune", STARTS)),
+)
+FROM_SCRATCH = (*FINE_TUNED, run_command(OURS, FETCH, FEW_SEEDS, _listed("scratch", STARTS)))
+
+
+def _against(baseline: str, final: str, faster: str) -> Iterator[Claim]:
+    """Yield the claims that compare the paper's method with one other, per task and across tasks."""
+    yield Claim(
+        f"final_return.all_tasks.{baseline}",
+        f"across all tasks, {final} {baseline}",
+        EFFICIENCY,
+        comparison.better_across_tasks(TASKS, OURS, baseline, SEEDS),
+    )
+    for task in TASKS:
+        yield Claim(
+            f"final_return.{task}.{baseline}",
+            f"on {task}, {final} {baseline}",
+            EFFICIENCY,
+            comparison.higher_final_return(task, OURS, baseline, SEEDS[task]),
+        )
+    for task in TASKS:
+        yield Claim(
+            f"steps.{task}.{baseline}",
+            f"on {task}, {faster} {baseline}",
+            EFFICIENCY,
+            comparison.fewer_steps(task, OURS, baseline, SEEDS[task]),
+        )
+
+
+CLAIMS: tuple[Claim, ...] = (
+    *(
+        claim
+        for baseline in PRIOR
+        for claim in _against(
+            baseline,
+            final="the framework ends with a higher return than",
+            faster="the framework needs fewer samples for the final return of",
+        )
+    ),
+    *_against(
+        SHARED,
+        final="separate designer and controller networks end with a higher return than",
+        faster="separate designer and controller networks need fewer samples for the final return of",
+    ),
+    *(
+        Claim(
+            f"tools_vary.{task}",
+            f"on {task}, one learned designer makes different tools for different goals",
+            TOOLS,
+            tools.tools_vary(task, OURS, SEEDS[task]),
+        )
+        for task in TASKS
+    ),
+    *(
+        Claim(
+            f"no_single_tool.{task}",
+            f"no single tool solves all instances of {task}",
+            ENVIRONMENTS,
+            tools.no_single_tool(task),
+        )
+        for task in TASKS
+    ),
+    Claim(
+        "zero_shot.close",
+        "with a very small cutout region, unseen starts of the cube are handled like seen ones",
+        ZERO_SHOT,
+        zero_shot.unseen_close(FETCH, OURS, min(FRACTIONS), CUTOUTS),
+    ),
+    Claim(
+        "zero_shot.falls",
+        "as the cutout region grows, the return on unseen starts falls",
+        ZERO_SHOT,
+        zero_shot.unseen_falls(FETCH, OURS, FRACTIONS, CUTOUTS),
+    ),
+    Claim(
+        "zero_shot.gently",
+        "as the cutout region grows, the return on unseen starts falls gently",
+        ZERO_SHOT,
+        zero_shot.unseen_falls_gently(FETCH, OURS, FRACTIONS, CUTOUTS),
+    ),
+    Claim(
+        "zero_shot.portion",
+        "even with the largest cutout region, a significant portion of unseen starts is solved",
+        ZERO_SHOT,
+        zero_shot.unseen_solved(FETCH, OURS, max(FRACTIONS), CUTOUTS),
+    ),
+    Claim(
+        "zero_shot.outside",
+        "policies solve starts of the cube even outside the training region",
+        ZERO_SHOT,
+        zero_shot.outside_solved(FETCH, OURS, run_command(OURS, FETCH, FEW_SEEDS)),
+    ),
+    *(
+        Claim(
+            f"fine_tuning.unsolved_before.{number}",
+            f"start {number} of the four outside the training region is not solved zero-shot",
+            FINE_TUNING,
+            fine_tuning.unsolved_before(FETCH, OURS, number, FINE_TUNED),
+        )
+        for number in STARTS
+    ),
+    *(
+        Claim(
+            f"fine_tuning.solved_after.{number}",
+            f"start {number} of the four outside the training region is solved after fine-tuning",
+            FINE_TUNING,
+            fine_tuning.solved_after(FETCH, OURS, number, FINE_TUNED),
+        )
+        for number in STARTS
+    ),
+    *(
+        Claim(
+            f"fine_tuning.wins.{number}",
+            f"on start {number} of the four, fine-tuning is more effective than learning from scratch",
+            FINE_TUNING,
+            fine_tuning.fine_tuning_wins(FETCH, OURS, number, FROM_SCRATCH),
+        )
+        for number in STARTS
+    ),
+    Claim(
+        "tradeoff.ratio",
+        "the ratio of design to control follows alpha",
+        TRADEOFF,
+        tradeoff.falls_with_alpha(CATCH, OURS, ALPHAS, tradeoff.RATIO, TRADEOFFS),
+    ),
+    Claim(
+        "tradeoff.ratio_in_order",
+        "the ratio of design to control follows alpha at each of its four values",
+        TRADEOFF,
+        tradeoff.ratio_in_order(CATCH, OURS, ALPHAS, TRADEOFFS),
+    ),
+    Claim(
+        "tradeoff.material",
+        "a larger alpha makes tools of less material",
+        TRADEOFF,
+        tradeoff.falls_with_alpha(CATCH, OURS, ALPHAS, tradeoff.MATERIAL, TRADEOFFS),
+    ),
+    Claim(
+        "tradeoff.effort",
+        "a smaller alpha, with its larger tools, needs less movement",
+        TRADEOFF,
+        tradeoff.rises_with_alpha(CATCH, OURS, ALPHAS, tradeoff.EFFORT, TRADEOFFS),
+    ),
+    *(
+        Claim(
+            f"deployment.own_instance.{task}",
+            f"on an arm, policies succeed on the instance of {task} that their tool was designed for",
+            REAL,
+            deployment.own_instance_solved(task, OURS),
+        )
+        for task in (FETCH, LIFT)
+    ),
+    Claim(
+        "deployment.grid",
+        "on an arm, no tool solves the whole grid of the cube's starts",
+        REAL,
+        deployment.no_tool_solves_the_grid(FETCH, OURS),
+    ),
+)

@@ -1,0 +1,149 @@
+"""Where the cells of a sweep run: in worker processes of this machine, or on a Dask cluster. Both through joblib.
+
+A backend yields the outcomes of jobs as they come and takes everything down that it started, on every way out. When
+workers die, it raises `WorkersDied`; the jobs that have not ended go on from their checkpoints when dispatched again.
+"""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from joblib import Parallel, delayed, parallel_config
+from joblib.externals.loky import get_reusable_executor
+from joblib.externals.loky.process_executor import BrokenProcessPool
+
+from codesign_bench.errors import UserError
+from codesign_bench.sweep.workers import Job, Outcome, prepare_worker, run_job
+
+BACKENDS = ("loky", "dask")
+CONNECT_SECONDS = 10.0
+
+
+class WorkersDied(Exception):
+    """Worker processes are gone, and with them the jobs that they were running."""
+
+
+class Backend(ABC):
+    """A context manager that runs jobs."""
+
+    def __enter__(self) -> Backend:
+        return self
+
+    @abstractmethod
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Take down what was started."""
+
+    @abstractmethod
+    def dispatch(self, queue: Sequence[Job]) -> Iterator[Outcome]:
+        """Yield the outcomes of jobs as they come.
+
+        Raises:
+            WorkersDied: some jobs have no outcome.
+        """
+
+
+class LokyBackend(Backend):
+    """Worker processes of this machine, `jobs` of them."""
+
+    def __init__(self, jobs: int) -> None:
+        self.jobs = jobs
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Leave the idle workers to joblib, which reuses them and ends them with this process."""
+
+    def dispatch(self, queue: Sequence[Job]) -> Iterator[Outcome]:
+        """Yield the outcomes of jobs as they come."""
+        pool = Parallel(
+            n_jobs=self.jobs,
+            backend="loky",
+            return_as="generator_unordered",
+            batch_size=1,
+            pre_dispatch=self.jobs,
+            initializer=prepare_worker,
+            initargs=(os.getpid(),),
+        )
+        try:
+            yield from pool(delayed(run_job)(job) for job in queue)
+        except BaseException as error:
+            if self.jobs > 1:
+                get_reusable_executor().shutdown(wait=False, kill_workers=True)
+            if isinstance(error, BrokenProcessPool):
+                raise WorkersDied from error
+            raise
+
+
+class DaskBackend(Backend):
+    """The workers of a Dask cluster: that of a scheduler, or one started here with `jobs` workers.
+
+    The results folder must be one that all workers see under the same path.
+    """
+
+    def __init__(self, jobs: int, scheduler: str | None) -> None:
+        self.jobs, self.scheduler = jobs, scheduler
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Backend:
+        """Connect.
+
+        Raises:
+            UserError: Dask is not installed, or the scheduler cannot be reached.
+        """
+        try:
+            from distributed import Client, LocalCluster
+        except ModuleNotFoundError as error:
+            raise UserError("--backend dask needs Dask: pip install 'codesign-bench[dask]'") from error
+        with ExitStack() as stack:
+            where: Any = self.scheduler
+            if where is None:
+                cluster = LocalCluster(n_workers=self.jobs, threads_per_worker=1, dashboard_address=None)
+                where = stack.enter_context(cluster)
+            try:
+                stack.enter_context(Client(where, timeout=CONNECT_SECONDS, set_as_default=True))
+            except (OSError, ValueError) as error:
+                raise UserError(f"--scheduler {self.scheduler}: no Dask scheduler answers there") from error
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Disconnect; a cluster that was started here ends."""
+        self._stack.close()
+
+    def dispatch(self, queue: Sequence[Job]) -> Iterator[Outcome]:
+        """Yield the outcomes of jobs as they come; a job whose worker dies is given to another."""
+        from distributed.scheduler import KilledWorker
+
+        jobs = [replace(job, out=str(Path(job.out).resolve())) for job in queue]
+        try:
+            with parallel_config(backend="dask"):
+                pool = Parallel(return_as="generator_unordered", batch_size=1, pre_dispatch="all")
+                yield from pool(delayed(run_job)(job) for job in jobs)
+        except KilledWorker as error:
+            raise WorkersDied from error
+
+
+def make_backend(name: str, jobs: int, scheduler: str | None) -> Backend:
+    """Return the backend `name`.
+
+    Raises:
+        UserError: an unknown name, or a scheduler for a backend without one.
+    """
+    if name == "dask":
+        return DaskBackend(jobs, scheduler)
+    if name != "loky":
+        raise UserError(f"--backend {name}: choose from: {', '.join(BACKENDS)}")
+    if scheduler is not None:
+        raise UserError("--scheduler goes with --backend dask")
+    return LokyBackend(jobs)

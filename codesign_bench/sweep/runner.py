@@ -1,0 +1,211 @@
+"""Run a grid of cells: plan what is left to do, spread it over workers, report how it ended."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from rich.console import Console
+
+from codesign_bench.cell.cell import Cell
+from codesign_bench.config.resolve import ResolvedConfig, differences
+from codesign_bench.errors import UserError
+from codesign_bench.machine import available_cores
+from codesign_bench.registry import IMPORTS_VARIABLE
+from codesign_bench.storage.checkpoint import load_checkpoint
+from codesign_bench.storage.results import (
+    CHECKPOINT_FILE,
+    CURVE_FILE,
+    DONE,
+    FAILED,
+    is_locked,
+    open_folder,
+    read_cell,
+)
+from codesign_bench.sweep.backends import Backend, WorkersDied, make_backend
+from codesign_bench.sweep.progress import ProgressDisplay
+from codesign_bench.sweep.workers import BUSY, Job, Outcome
+
+EXIT_ALL_DONE, EXIT_SOME_FAILED = 0, 1
+MAX_BROKEN_POOLS = 10
+"""How often in a row the worker processes may die without a single cell ending."""
+LOCK_POLL_SECONDS = 1.0
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a sweep finds in its results folder."""
+
+    done: list[Cell]
+    failed: dict[Cell, str]
+    """Cells that failed earlier and are not tried again, with their message."""
+    pending: list[Cell]
+    configs: dict[Cell, ResolvedConfig]
+
+
+def make_plan(cells: Sequence[Cell], out: Path, *, retry_failed: bool = False) -> Plan:
+    """Sort `cells` by what is left to do in `out`, before anything runs.
+
+    Raises:
+        UserError: a bad configuration, a cell of another configuration, a damaged cell file or checkpoint.
+    """
+    plan = Plan([], {}, [], {cell: cell.config() for cell in cells})
+    contents = {cell: read_cell(cell.folder(out)) for cell in cells}
+    _refuse_other_configurations(plan.configs, contents, out)
+    _refuse_without_pretrained(cells, out)
+    for cell, content in contents.items():
+        if content is not None and content["status"] == DONE:
+            plan.done.append(cell)
+        elif content is not None and content["status"] == FAILED and not retry_failed:
+            plan.failed[cell] = content["failure"]["message"]
+        else:
+            load_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is refused here, not in the middle
+            plan.pending.append(cell)
+    return plan
+
+
+def split_cores(cores: int, cells: int, threads: int, jobs: int | None) -> tuple[int, str]:
+    """Return how many cells run at a time, and a line that says how the cores are split.
+
+    Args:
+        threads: threads of one cell.
+        jobs: what the user asks for, or None; jobs x threads never exceeds the cores.
+
+    Raises:
+        UserError: one cell has more threads than there are cores.
+    """
+    if threads > cores:
+        raise UserError(f"--set threads={threads}: there are only {cores} cores")
+    most = cores // threads
+    used = max(1, min(most, cells, jobs or most))
+    notice = f" (--jobs {jobs} would need more cores than there are)" if jobs is not None and jobs > most else ""
+    return used, f"{used} at a time with {threads} thread{'s' * (threads > 1)} each on {cores} cores{notice}"
+
+
+def run_sweep(
+    cells: Sequence[Cell],
+    out: Path,
+    *,
+    console: Console,
+    jobs: int | None = None,
+    retry_failed: bool = False,
+    backend: str = "loky",
+    scheduler: str | None = None,
+) -> int:
+    """Run every cell that `out` does not hold yet; return 0 if all are done in the end, 1 if some failed.
+
+    Raises:
+        UserError: bad input, found before anything runs.
+        KeyboardInterrupt: the user stopped the sweep; its processes are gone, the same call resumes it.
+    """
+    open_folder(out)
+    plan = make_plan(cells, out, retry_failed=retry_failed)
+    threads = max((config.run.threads for config in plan.configs.values()), default=1)
+    used_jobs, split = split_cores(available_cores(), len(plan.pending), threads, jobs)
+    chosen = make_backend(backend, used_jobs, scheduler)
+    say = _printer(console)
+    say(f"{len(cells)} cells, {len(plan.done)} of them done before; results in {out}")
+    failures = dict(plan.failed)
+    if plan.pending:
+        say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
+        imported = os.environ.get(IMPORTS_VARIABLE, "")
+        queue = [Job(cell, str(out), retry_failed, imported) for cell in plan.pending]
+        budgets = {cell: plan.configs[cell].run.steps for cell in plan.pending}
+        with chosen as workers, ProgressDisplay(console, out, budgets) as display:
+            failures |= _run_queue(queue, workers, display)
+    return _conclude(say, len(cells), failures, plan.failed)
+
+
+def _run_queue(queue: list[Job], workers: Backend, display: ProgressDisplay) -> dict[Cell, str]:
+    """Run all jobs; cells that another sweep holds come last. Return the failures."""
+    failures: dict[Cell, str] = {}
+    waiting_told = False
+    broken = 0
+    while queue:
+        free = [job for job in queue if not is_locked(job.cell.folder(Path(job.out)))]
+        if not free:
+            if not waiting_told:
+                display.say(f"waiting for {len(queue)} cells that another sweep is running")
+            waiting_told = True
+            time.sleep(LOCK_POLL_SECONDS)
+            continue
+        ended = 0
+        try:
+            for outcome in workers.dispatch(free):
+                if outcome.status != BUSY:
+                    ended += 1
+                    queue = [job for job in queue if job.cell != outcome.cell]
+                    _tell(outcome, display, failures)
+        except WorkersDied as error:
+            broken = 0 if ended else broken + 1
+            if broken == MAX_BROKEN_POOLS:
+                raise RuntimeError("the worker processes keep dying") from error
+            display.say("a worker process died; its cells are started again from their checkpoints")
+    return failures
+
+
+def _tell(outcome: Outcome, display: ProgressDisplay, failures: dict[Cell, str]) -> None:
+    display.ended(outcome.cell)
+    if outcome.status == FAILED:
+        failures[outcome.cell] = outcome.message
+        display.say(f"failed  {outcome.cell.name}  {_one_line(outcome.message)}")
+    else:
+        display.say(f"done    {outcome.cell.name}  {_last_row(outcome.cell, display.out)}")
+
+
+def _last_row(cell: Cell, out: Path) -> str:
+    last = pd.read_csv(cell.folder(out) / CURVE_FILE).iloc[-1]
+    outcome = f"return {last['return_mean']:.2f}, success {last['success_rate']:.2f}"
+    return f"{outcome}, {last['env_steps']:,.0f} steps, {last['wall_s']:.0f} s"
+
+
+def _refuse_other_configurations(
+    configs: dict[Cell, ResolvedConfig], contents: dict[Cell, dict[str, Any] | None], out: Path
+) -> None:
+    refused = [
+        (cell, different)
+        for cell, content in contents.items()
+        if content is not None and (different := differences(content["config"], configs[cell]))
+    ]
+    if refused:
+        cell, different = refused[0]
+        shown = "; ".join(different[:6]) + (f"; and {len(different) - 6} more" if len(different) > 6 else "")
+        others = f" (and {len(refused) - 1} cells more)" if len(refused) > 1 else ""
+        raise UserError(f"{cell.folder(out)}{others} was run with another configuration: {shown}\nchoose another --out")
+
+
+def _refuse_without_pretrained(cells: Sequence[Cell], out: Path) -> None:
+    for cell in cells:
+        if cell.finetune is not None:
+            before = cell.pretrained()
+            content = read_cell(before.folder(out))
+            if content is None or content["status"] != DONE:
+                raise UserError(
+                    f"--finetune: {cell.name} goes on from {before.name}, which is not done in {out}\nrun it first: "
+                    f"codesign-bench run --method {cell.method} --task {cell.task} --seeds {cell.seed}-{cell.seed} "
+                    f"--profile {cell.profile} --out {out}, with the same --set if any"
+                )
+
+
+def _conclude(say: Any, cells: int, failures: dict[Cell, str], earlier: dict[Cell, str]) -> int:
+    for cell, message in earlier.items():
+        say(f"failed earlier  {cell.name}  {_one_line(message)}")
+    if not failures:
+        say(f"all {cells} cells done")
+        return EXIT_ALL_DONE
+    hint = "; --retry-failed tries them again" if failures else ""
+    say(f"{len(failures)} of {cells} cells failed; their cell.json holds the traceback{hint}")
+    return EXIT_SOME_FAILED
+
+
+def _printer(console: Console) -> Any:
+    return lambda line: console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

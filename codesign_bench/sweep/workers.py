@@ -1,0 +1,147 @@
+"""What a joblib worker does: run one cell in a fresh process and say how it ended."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import filelock
+
+from codesign_bench.cell.cell import Cell
+from codesign_bench.errors import UserError
+from codesign_bench.processes import end_with, thread_environment
+from codesign_bench.registry import IMPORTS_VARIABLE
+from codesign_bench.storage.results import (
+    DONE,
+    FAILED,
+    LOG_FILE,
+    PROGRESS_FILE,
+    RUNNING,
+    cell_lock,
+    is_locked,
+    read_cell,
+)
+from codesign_bench.sweep import cell_process
+
+BUSY = "busy"
+"""The outcome of a cell that another sweep is running."""
+START = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); "
+    "from codesign_bench.sweep.cell_process import start; start()"
+)
+"""Starts a cell's process with this process's module path, whatever folder it is started in."""
+SETTLE_SECONDS = 1.0
+
+
+@dataclass(frozen=True)
+class Job:
+    """One cell and how to run it; plain values, so that it travels to a worker."""
+
+    cell: Cell
+    out: str
+    retry_failed: bool
+    imported: str
+    """Modules of `--import`, as the environment variable names them; a worker elsewhere has another environment."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one cell ended: "done", "failed" or "busy"."""
+
+    cell: Cell
+    status: str
+    message: str = ""
+    """One line about a failure."""
+
+
+def prepare_worker(main_pid: int) -> None:
+    """Make this joblib worker ignore Ctrl-C, which the main process handles, and end when the main process does."""
+    if os.getpid() == main_pid:
+        return
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with(main_pid)
+
+
+def run_job(job: Job) -> Outcome:
+    """Run the job's cell in a process of its own and return how it ended; a dead process is recorded as a failure."""
+    folder = job.cell.folder(Path(job.out))
+    folder.mkdir(parents=True, exist_ok=True)
+    if is_locked(folder):
+        return Outcome(job.cell, BUSY)
+    (folder / PROGRESS_FILE).unlink(missing_ok=True)
+    code = _run_process(job, folder)
+    if code == cell_process.EXIT_DONE:
+        return Outcome(job.cell, DONE)
+    if code == cell_process.EXIT_BUSY:
+        return Outcome(job.cell, BUSY)
+    if code == cell_process.EXIT_FAILED and (message := _recorded_failure(folder)):
+        return Outcome(job.cell, FAILED, message)
+    if code == cell_process.EXIT_REFUSED:
+        return Outcome(job.cell, FAILED, _end_of_log(folder).strip())
+    return Outcome(job.cell, FAILED, _record_death(folder, code))
+
+
+def _run_process(job: Job, folder: Path) -> int:
+    command = [sys.executable, "-c", START, json.dumps(sys.path), job.cell.to_json(), job.out]
+    with open(folder / LOG_FILE, "wb") as log:
+        process = subprocess.Popen(
+            [*command, *(["retry"] if job.retry_failed else [])],
+            stdin=subprocess.PIPE,  # never written to: its end tells the process that its parent is gone
+            stdout=log,
+            stderr=log,
+            env={**thread_environment(), IMPORTS_VARIABLE: job.imported},
+        )
+        try:
+            return process.wait()
+        finally:
+            if process.poll() is None:
+                process.kill()
+                process.wait()
+
+
+def _recorded_failure(folder: Path) -> str:
+    content = read_cell(folder)
+    return content["failure"]["message"] if content is not None and content["status"] == FAILED else ""
+
+
+def _record_death(folder: Path, code: int) -> str:
+    """Record the death of a cell's process and return its line; called once nobody else can be running the cell."""
+    # When a whole tree of processes is killed, this one goes next: then the cell is interrupted, not failed.
+    time.sleep(SETTLE_SECONDS)
+    message = describe_exit(code)
+    try:
+        with cell_lock(folder).acquire(timeout=0):
+            content = read_cell(folder)
+            if content is not None and content["status"] == RUNNING:
+                trace = _end_of_log(folder) or message
+                cell_process.end(folder, content, FAILED, failure=cell_process.failure(message, trace))
+            elif content is None:
+                message = f"{message}: {_end_of_log(folder).strip()}"
+    except (filelock.Timeout, UserError) as error:
+        return f"{message} ({error})"
+    return message
+
+
+def describe_exit(code: int) -> str:
+    """Say in words how a process ended that recorded no outcome."""
+    if code >= 0:
+        return f"the cell's process ended with exit code {code} and recorded nothing"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    hint = "; the system may be out of memory" if name == "SIGKILL" else ""
+    return f"the cell's process was killed by {name}{hint}"
+
+
+def _end_of_log(folder: Path, characters: int = 4000) -> str:
+    try:
+        return (folder / LOG_FILE).read_text(errors="replace")[-characters:]
+    except OSError:
+        return ""

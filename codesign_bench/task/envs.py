@@ -1,0 +1,264 @@
+"""Gymnasium environments over the two-phase episode, single and batched: `codesign_bench/Push-v0` and its like.
+
+Shapes: `B` environments, `O` observation, `D` design, `C` control, `I` instance. Listing the environments imports no
+task; a task is loaded when one is made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from codesign_bench.task.episodes import Episodes, Tradeoff
+from codesign_bench.task.loading import load_task, task_names
+from codesign_bench.task.spaces import Booleans, Floats, Singles, Slots
+from codesign_bench.task.task import Task
+
+NAMESPACE = "codesign_bench"
+RGB_ARRAY = "rgb_array"
+"""The render mode."""
+
+
+def environment_id(task_name: str) -> str:
+    """Return the Gymnasium id of a task: `scoop_3d` -> `codesign_bench/Scoop3D-v0`."""
+    words = [word.upper() if word[:1].isdigit() else word[:1].upper() + word[1:] for word in task_name.split("_")]
+    return f"{NAMESPACE}/{''.join(words)}-v0"
+
+
+def register_environments() -> None:
+    """Register an environment for every known task, third-party ones included; those already there stay."""
+    for name in task_names():
+        if environment_id(name) not in gymnasium.registry:
+            gymnasium.register(
+                environment_id(name),
+                entry_point=f"{__name__}:ToolEnv",
+                vector_entry_point=f"{__name__}:ToolVectorEnv",
+                kwargs={"task_name": name},
+            )
+
+
+def action_space(task: Task) -> Box:
+    """Return the box [design | control] of (D + C,) normalised values."""
+    return Box(-1.0, 1.0, (task.design_space.size + task.control_space.size,), np.float32)
+
+
+def observation_space(task: Task) -> Box:
+    """Return the box [state | goal | design | phase] of (O,) values; state and goal have units."""
+    design = np.ones(task.design_space.size)
+    phase = np.ones(len(task.layout.PHASE_NAMES))
+    low = np.concatenate([task.state_space.low, task.goal_space.low, -design, 0.0 * phase])
+    high = np.concatenate([task.state_space.high, task.goal_space.high, design, phase])
+    return Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
+
+
+class _Rollouts:
+    """The episodes of `B` environments, each with its own generator of instances, that may be in different phases."""
+
+    def __init__(self, task: Task, num_slots: int, tradeoff: Tradeoff | None) -> None:
+        self.task = task
+        self.episodes = Episodes(task, num_slots, tradeoff)
+        self.designing: Booleans = np.zeros(num_slots, dtype=bool)
+        """(B,) whether the next step is the design step."""
+        self.ended: Booleans = np.ones(num_slots, dtype=bool)
+        """(B,) whether the episode is over, or never began."""
+
+    def reset(self, slots: Slots, instances: Floats) -> None:
+        """Begin episodes of `instances` (b, I) in `slots` (b,)."""
+        self.episodes.begin(slots, instances)
+        self.designing[slots] = True
+        self.ended[slots] = False
+
+    def step(self, slots: Slots, actions: Floats) -> tuple[Floats, Booleans, Booleans]:
+        """Take one design or control step in `slots` (b,) with actions (b, D + C).
+
+        Returns:
+            reward, terminated and truncated, each (b,).
+        """
+        if self.ended[slots].any():
+            raise gymnasium.error.ResetNeeded("an episode has ended, or never began: call reset() before step()")
+        reward = np.zeros(len(slots))
+        terminated, truncated = np.zeros(len(slots), dtype=bool), np.zeros(len(slots), dtype=bool)
+        size = self.task.design_space.size
+        first = self.designing[slots]
+        if first.any():
+            self.episodes.design(slots[first], actions[first, :size])
+        if not first.all():
+            later = ~first
+            outcome = self.episodes.control(slots[later], actions[later, size:])
+            reward[later], terminated[later], truncated[later] = outcome
+        self.designing[slots] = False
+        self.ended[slots] = terminated | truncated
+        return reward, terminated, truncated
+
+    def sample(self, slot_generators: Sequence[np.random.Generator]) -> Floats:
+        """Return (b, I) instances, one from each generator: an environment's instances do not depend on the others."""
+        return np.concatenate([self.task.sample_instances(rng, 1) for rng in slot_generators])
+
+
+class ToolEnv(gymnasium.Env[Any, Any]):
+    """One two-phase episode at a time: the first step builds the tool, the others use it.
+
+    Action space
+        One box [design | control] in [-1, 1]. The first step reads the design part alone, later ones the control part.
+
+    Observation
+        [state | goal | design | phase] as the task's docstring says; design and phase have no unit. The design is
+        zero before the first step; the phase is (design phase?, control phase?, elapsed fraction of the horizon).
+
+    Reward
+        0 for the design step, then the task's reward, plus the trade-off reward (equation 1 of the paper) if asked for.
+
+    Starting state
+        An instance of the task from the environment's generator, or `reset(options={"instance": (I,) array})`.
+
+    Episode end
+        Terminated by success or failure, truncated at the time limit; `info["success"]` on the last step tells which.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [RGB_ARRAY]}  # noqa: RUF012 - Gymnasium reads it from the class
+
+    def __init__(self, task_name: str, tradeoff: Tradeoff | None = None, render_mode: str | None = None) -> None:
+        self.task = load_task(task_name)
+        self.observation_space = observation_space(self.task)
+        self.action_space = action_space(self.task)
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.task.control_period)}
+        self._rollouts = _Rollouts(self.task, 1, tradeoff)
+        self._slots: Slots = np.zeros(1, dtype=np.intp)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Singles, dict[str, Any]]:
+        """Begin an episode; `seed` restarts the generator of instances."""
+        super().reset(seed=seed)
+        given = (options or {}).get("instance")
+        instances = self._rollouts.sample([self.np_random]) if given is None else _given(given, self.task, 1)
+        self._rollouts.reset(self._slots, instances)
+        return self._observation(), {}
+
+    def step(self, action: Singles) -> tuple[Singles, float, bool, bool, dict[str, Any]]:
+        """Take the design step or a control step with `action` (D + C,).
+
+        Raises:
+            gymnasium.error.ResetNeeded: no episode is running.
+            ValueError: the action is not finite.
+        """
+        actions = np.asarray(action, dtype=np.float64)[None]
+        reward, terminated, truncated = self._rollouts.step(self._slots, actions)
+        ended = bool(terminated[0] or truncated[0])
+        info = {"success": bool(self._rollouts.episodes.success(self._slots)[0])} if ended else {}
+        return self._observation(), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
+
+    def render(self) -> Any:
+        """Return a picture of the scene, (height, width, 3), in RGB, with `render_mode="rgb_array"`; else None."""
+        return self._rollouts.episodes.simulator.render(0) if self.render_mode == RGB_ARRAY else None
+
+    def _observation(self) -> Singles:
+        return self._rollouts.episodes.observation[0].copy()
+
+
+class ToolVectorEnv(VectorEnv[Any, Any, Any]):
+    """`num_envs` environments like `ToolEnv` in one process and one batched simulator, the one that methods train on.
+
+    The step after an episode's last begins the next one (Gymnasium's NEXT_STEP): it ignores the action and has reward
+    0. `info["success"]` (B,) holds where `info["_success"]` (B,) is true, which is on last steps. Environment `i` of
+    `reset(seed=s)` goes as `ToolEnv` does after `reset(seed=s + i)`.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium reads it from the class
+        "render_modes": [RGB_ARRAY],
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self, task_name: str, num_envs: int = 1, tradeoff: Tradeoff | None = None, render_mode: str | None = None
+    ) -> None:
+        self.task = load_task(task_name)
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.task.control_period)}
+        self.single_observation_space = observation_space(self.task)
+        self.single_action_space = action_space(self.task)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._rollouts = _Rollouts(self.task, num_envs, tradeoff)
+        self._generators: list[np.random.Generator] = [seeding.np_random()[0] for _ in range(num_envs)]
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Singles, dict[str, Any]]:
+        """Begin an episode in every environment, or in those of `options["reset_mask"]` (B,).
+
+        Args:
+            seed: restarts the generators of instances: environment `i` gets `seed + i`, or `seed[i]` (None: goes on).
+            options: may hold `instance`, (I,) for all or (B, I), and `reset_mask`.
+        """
+        chosen = options or {}
+        slots: Slots = np.flatnonzero(chosen.get("reset_mask", np.ones(self.num_envs, dtype=bool)))
+        for slot, value in enumerate(self._seeds(seed)):
+            if value is not None and slot in slots:
+                self._generators[slot] = seeding.np_random(value)[0]
+        given = chosen.get("instance")
+        if given is None:
+            self._begin(slots)
+        else:
+            self._rollouts.reset(slots, _given(given, self.task, self.num_envs)[slots])
+        return self._rollouts.episodes.observation.copy(), {}
+
+    def step(self, actions: Singles) -> tuple[Singles, Floats, Booleans, Booleans, dict[str, Any]]:
+        """Step every environment with `actions` (B, D + C); those that ended begin anew instead.
+
+        Returns:
+            observation (B, O), reward, terminated and truncated, each (B,), and info.
+
+        Raises:
+            ValueError: an action is not finite.
+        """
+        reward = np.zeros(self.num_envs)
+        terminated, truncated = np.zeros(self.num_envs, dtype=bool), np.zeros(self.num_envs, dtype=bool)
+        over, going = np.flatnonzero(self._rollouts.ended), np.flatnonzero(~self._rollouts.ended)
+        if len(going):
+            outcome = self._rollouts.step(going, np.asarray(actions, dtype=np.float64)[going])
+            reward[going], terminated[going], truncated[going] = outcome
+        if len(over):
+            self._begin(over)
+        return self._rollouts.episodes.observation.copy(), reward, terminated, truncated, self._info()
+
+    def render(self) -> tuple[Any, ...] | None:
+        """Return a picture of every scene with `render_mode="rgb_array"`; else None."""
+        simulator = self._rollouts.episodes.simulator
+        return tuple(simulator.render(slot) for slot in range(self.num_envs)) if self.render_mode == RGB_ARRAY else None
+
+    def _begin(self, slots: Slots) -> None:
+        self._rollouts.reset(slots, self._rollouts.sample([self._generators[slot] for slot in slots]))
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        if seed is None or isinstance(seed, int):
+            return [None if seed is None else seed + slot for slot in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"{len(seed)} seeds given for {self.num_envs} environments")
+        return seed
+
+    def _info(self) -> dict[str, Any]:
+        ended = self._rollouts.ended.copy()
+        if not ended.any():
+            return {}
+        return {"success": ended & self._rollouts.episodes.simulator.success, "_success": ended}
+
+
+def _given(instance: Any, task: Task, count: int) -> Floats:
+    """Return `instance`, (I,) for all or (count, I), as (count, I) values."""
+    size = task.instance_space.size
+    values = np.asarray(instance, dtype=np.float64)
+    if values.shape not in ((size,), (count, size)):
+        raise ValueError(
+            f"options['instance'] has shape {values.shape}, not ({size},): {', '.join(task.instance_space.names)}"
+        )
+    return np.broadcast_to(values, (count, size)).copy()

@@ -1,0 +1,116 @@
+"""The two-phase episode over any simulator: one design step, then control until success or the time limit.
+
+Shapes: `B` slots, `b` the slots a call names, `O` observation, `D` design, `C` control, `I` instance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from codesign_bench.task.simulator import Simulator
+from codesign_bench.task.spaces import Booleans, Floats, Singles, Slots
+from codesign_bench.task.task import Task
+
+
+@dataclass(frozen=True)
+class Tradeoff:
+    """The auxiliary reward of equation 1; `alpha` weighs material against control effort, `scale` is the paper's K."""
+
+    alpha: float
+    scale: float
+
+    def reward(self, material: Floats, effort: Floats) -> Floats:
+        """Return K [1 - (alpha d_used/d_max + (1 - alpha) c_used/c_max)] for (b,) fractions in [0, 1]."""
+        return self.scale * (1.0 - (self.alpha * material + (1.0 - self.alpha) * effort))
+
+
+def portions(count: int, task: Task) -> list[Slots]:
+    """Return the numbers below `count` in as few near-equal portions as the task's simulators may have slots for."""
+    return list(np.array_split(np.arange(count), -(-count // task.max_slots)))
+
+
+class Episodes:
+    """Runs `num_slots` independent two-phase episodes and keeps their observations (B, O) in one array.
+
+    An episode in a slot goes `begin`, `design`, then `control` until it is terminated or truncated. The design step
+    counts as an environment step and has reward 0.
+    """
+
+    def __init__(
+        self, task: Task, num_slots: int, tradeoff: Tradeoff | None = None, simulator: Simulator | None = None
+    ) -> None:
+        self.task = task
+        self.tradeoff = tradeoff
+        self.num_slots = num_slots
+        self.layout = task.layout
+        self.simulator = task.make_simulator(num_slots) if simulator is None else simulator
+        self.observation: Singles = np.zeros((num_slots, self.layout.size), dtype=np.float32)
+        self.elapsed = np.zeros(num_slots, dtype=np.intp)
+        """(B,) control steps since the design step."""
+        self._material = np.zeros(num_slots)
+        space = task.state_space
+        self._state_low, self._state_high = np.array(space.low, np.float32), np.array(space.high, np.float32)
+
+    def begin(self, slots: Slots, instances: Floats) -> None:
+        """Start an episode of each instance (b, I) in its slot, in the design phase."""
+        self.simulator.begin(slots, instances)
+        self.elapsed[slots] = 0
+        self.observation[slots, self.layout.goal] = instances[:, : self.task.goal_size]
+        self.observation[slots, self.layout.design] = 0.0
+        self.observation[slots, self.layout.phase] = (1.0, 0.0, 0.0)
+        self._observe(slots)
+
+    def design(self, slots: Slots, designs: Floats) -> None:
+        """Take the design step with `designs` (b, D), clipped to [-1, 1].
+
+        Raises:
+            ValueError: a design is not finite.
+        """
+        clipped = _finite(designs, "design")
+        physical = self.task.design_space.from_unit(clipped)
+        self.simulator.build(slots, physical)
+        if self.tradeoff is not None:
+            self._material[slots] = self.task.material(physical)
+        self.observation[slots, self.layout.design] = clipped
+        self.observation[slots, self.layout.phase] = (0.0, 1.0, 0.0)
+        self._observe(slots)
+
+    def control(self, slots: Slots, controls: Floats) -> tuple[Floats, Booleans, Booleans]:
+        """Take one control step with `controls` (b, C), clipped to [-1, 1].
+
+        Returns:
+            reward, terminated (success or failure) and truncated (time limit), each (b,).
+
+        Raises:
+            ValueError: a control is not finite.
+        """
+        clipped = _finite(controls, "control")
+        simulator = self.simulator
+        simulator.step(slots, clipped)
+        self.elapsed[slots] += 1
+        reward = simulator.reward[slots]
+        if self.tradeoff is not None:
+            reward = reward + self.tradeoff.reward(self._material[slots], self.task.effort(clipped))
+        self.observation[slots, self.layout.phase.stop - 1] = self.elapsed[slots] / self.task.horizon
+        self._observe(slots)
+        terminated = simulator.success[slots] | simulator.failure[slots]
+        truncated = (self.elapsed[slots] >= self.task.horizon) & ~terminated
+        return reward, terminated, truncated
+
+    def success(self, slots: Slots) -> Booleans:
+        """Tell which of `slots` (b,) hold a solved episode."""
+        return self.simulator.success[slots]
+
+    def _observe(self, slots: Slots) -> None:
+        state = self.simulator.state[slots]
+        self.observation[slots, self.layout.state] = np.clip(state, self._state_low, self._state_high)
+
+
+def _finite(values: Floats, what: str) -> Floats:
+    bad = ~np.isfinite(values)
+    if bad.any():
+        row = int(np.flatnonzero(bad.any(axis=-1))[0])
+        raise ValueError(f"{bad.sum()} values of the {what} are not finite, the first in row {row}: {values[row]}")
+    return np.clip(values, -1.0, 1.0).astype(np.float64, copy=False)

@@ -1,0 +1,154 @@
+"""What a task is: spaces, instances, a batched simulator. It knows nothing of methods.
+
+Shapes: `b` batch, `I` instance, `G` goal, `D` design, `C` control.
+A new task is one file in `tasks/` with one public subclass of `Task`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from codesign_bench.errors import UserError
+from codesign_bench.seeding import generator
+from codesign_bench.task.behaviour import Behaviour
+from codesign_bench.task.simulator import Simulator, Soundness
+from codesign_bench.task.spaces import Booleans, Box, Floats, Layout, Quantity
+from codesign_bench.task.tool import ToolGraph, ToolPart
+
+if TYPE_CHECKING:
+    from codesign_bench.task.robot import DeployedSimulator, RobotTrials
+
+EVALUATION_SEED = 20231106
+"""Seed of every task's fixed evaluation instances; training never uses it (ours)."""
+
+
+class Task(ABC):
+    """A goal-conditioned task of tool design and use (paper, section "Problem Setting").
+
+    Spaces carry the units; policies see normalised designs and controls in [-1, 1].
+    """
+
+    name: ClassVar[str]
+    """Its name, which is its file's name."""
+    title: ClassVar[str]
+    """Its name in figures."""
+    horizon: ClassVar[int]
+    """Control steps until the time limit."""
+    control_period: ClassVar[float]
+    """Simulated time of one control step, in s."""
+    design_space: ClassVar[Box]
+    tool_graph: ClassVar[ToolGraph]
+    control_space: ClassVar[Box]
+    instance_space: ClassVar[Box]
+    """All that differs between episodes: first the goal, then whatever the policies are not told as a goal."""
+    goal_size: ClassVar[int]
+    """How many leading entries of an instance are the goal."""
+    state_space: ClassVar[Box]
+    outcome: ClassVar[Quantity | None] = None
+    """What `Simulator.outcome` measures: how far the task got, whatever the reward."""
+    soundness: ClassVar[Soundness | None] = None
+    """What the task promises of its physics; built-in tasks all do."""
+    num_evaluation_instances: ClassVar[int] = 128
+    max_slots: ClassVar[int] = 1_000
+    """Most slots to ask of one simulator when many episodes are to be played; a world may need much memory."""
+
+    @property
+    def goal_space(self) -> Box:
+        """The leading, visible part of the instance space."""
+        space, count = self.instance_space, self.goal_size
+        return Box(space.names[:count], space.low[:count], space.high[:count], space.units[:count])
+
+    @property
+    def layout(self) -> Layout:
+        """The parts of this task's observations."""
+        return Layout.of(self.state_space.size, self.goal_size, self.design_space.size)
+
+    def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
+        """Return (count, I) random instances, uniform in the instance space unless a task says otherwise."""
+        return self.instance_space.sample(rng, count)
+
+    def evaluation_instances(self) -> Floats:
+        """Return the (num_evaluation_instances, I) instances on which every method is judged, always the same."""
+        return self.sample_instances(generator(EVALUATION_SEED, self.name), self.num_evaluation_instances)
+
+    def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
+        """Tell which instances (b, I) lie in the cutout region, `fraction` of the training region (section 5.2).
+
+        Raises:
+            UserError: the task has no goal or start that is a position.
+        """
+        raise UserError(f"--cutout: neither goals nor starts of task '{self.name}' are positions")
+
+    def fine_tuning_instances(self) -> Floats:
+        """Return the (b, I) instances outside the training region on which policies are tuned further (section 5.2).
+
+        Raises:
+            UserError: the task names none.
+        """
+        raise UserError(f"task '{self.name}' names no instances for fine-tuning")
+
+    @abstractmethod
+    def material(self, designs: Floats) -> Floats:
+        """Return d_used / d_max in [0, 1] for designs (b, D) in their units (equation 1)."""
+
+    @abstractmethod
+    def effort(self, controls: Floats) -> Floats:
+        """Return c_used / c_max in [0, 1] for controls (b, C) in [-1, 1] (equation 1)."""
+
+    def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
+        """Return what the tool of a design (D,), in the design space's units, is made of.
+
+        These are the shapes that the simulator lets collide, in the order of the tool graph's nodes and of one kind;
+        they may overlap.
+
+        Raises:
+            UserError: the task does not tell.
+        """
+        raise UserError(f"task '{self.name}' does not tell what its tools are made of")
+
+    def gripper_handle(self) -> tuple[ToolPart, ...]:
+        """Return what a robot's gripper holds a printed tool by, beyond `tool_parts`, in the frame of the held point.
+
+        The first part touches the tool's node 0, every other one the part before it. None by default: the task has no
+        gripper, or the tool has a handle of its own.
+        """
+        return ()
+
+    def script(self) -> Behaviour:
+        """Return a designer and a controller written by hand, for pictures and checks: functions of the observation.
+
+        The controller uses whatever tool it is given. Neither needs to solve every instance.
+
+        Raises:
+            UserError: nobody wrote one.
+        """
+        raise UserError(f"task '{self.name}' has no script")
+
+    @abstractmethod
+    def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
+        """Return a simulator with `num_slots` slots.
+
+        Args:
+            num_slots: episodes side by side.
+            refinement: physics steps are this many times as many and as short (for checks; a task of a third party
+                may leave this argument out).
+        """
+
+    def make_deployed_simulator(self, num_slots: int, arm: str) -> DeployedSimulator:
+        """Return a simulator with `num_slots` slots whose tools are held by `arm`, one of `deployment.robot.ARMS`.
+
+        Raises:
+            UserError: the task has none.
+        """
+        raise UserError(f"task '{self.name}' cannot be deployed on an arm")
+
+    def robot_trials(self) -> RobotTrials:
+        """Return the instances of the paper's evaluation on a real robot.
+
+        Raises:
+            UserError: the task has none.
+        """
+        raise UserError(f"task '{self.name}' cannot be deployed on an arm")

@@ -53,7 +53,7 @@ def play(conditions: Conditions, instance: Floats = NEAR_START, task_name: str =
     task = load_task(task_name)
     policy = Watched(task.script())
     deployment = Deployment(task, policy, conditions)
-    return deployment.play(instance, deployment.design(instance), generator(0, "test"), None), policy.seen
+    return deployment.play(instance, deployment.unit_design(instance), generator(0, "test"), None), policy.seen
 
 
 def test_the_papers_real_starts_are_turned_by_half_a_turn_into_our_frame() -> None:
@@ -228,5 +228,5 @@ def test_watching_a_trial_sees_its_start_and_every_step() -> None:
     def watch(episodes: Episodes) -> None:
         moments.append(int(episodes.elapsed[0]))
 
-    rollout = deployment.play(NEAR_START, deployment.design(NEAR_START), generator(0, "watch"), watch)
+    rollout = deployment.play(NEAR_START, deployment.unit_design(NEAR_START), generator(0, "watch"), watch)
     assert moments == list(range(rollout.steps + 1))

@@ -10,8 +10,9 @@ from PIL import Image
 
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
-from codesign_bench.evaluation.rendering import CAPTION_PIXELS, FRAMES_PER_SECOND, MOMENTS, RandomBehaviour, render
+from codesign_bench.evaluation.rendering import CAPTION_PIXELS, FRAMES_PER_SECOND, MOMENTS, render
 from codesign_bench.task import load_task
+from codesign_bench.task.behaviours import RandomBehaviour
 
 TRAINED = Path(__file__).resolve().parent.parent / "results" / "reference" / "push" / "gnn_ppo" / "default" / "seed-00"
 

@@ -14,9 +14,10 @@ from codesign_bench.cli import main
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation import sensitivity
 from codesign_bench.evaluation.evaluate import evaluate
-from codesign_bench.evaluation.sensitivity import COLUMNS, GivenTools, load_or_measure, measure, tools_of
+from codesign_bench.evaluation.sensitivity import COLUMNS, load_or_measure, measure, tools_of
 from codesign_bench.figures.drawing import draw_figures
 from codesign_bench.task import load_task
+from codesign_bench.task.behaviours import GivenDesigns
 
 
 def test_every_tool_meets_every_goal_and_only_the_tool_differs() -> None:
@@ -30,7 +31,7 @@ def test_every_tool_meets_every_goal_and_only_the_tool_differs() -> None:
     goals = task.evaluation_instances()[:3]
     own = evaluate(task, task.script(), instances=goals)
     np.testing.assert_allclose(table.loc[table["own"] == 1, "return"], own.returns)
-    third = evaluate(task, GivenTools(tools_of(task, goals, 5)[2:3], task.script()), instances=goals[1:2])
+    third = evaluate(task, GivenDesigns(tools_of(task, goals, 5)[2:3], task.script()), instances=goals[1:2])
     row = table[(table["tool"] == 2) & (table["goal"] == 1)].iloc[0]
     assert row["outcome"] == pytest.approx(third.outcomes[0])
     assert row["outcome_unit"] == "m"

@@ -30,10 +30,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Draw the episodes and print the path."""
-    from codesign_bench.evaluation.rendering import RandomBehaviour, render
+    from codesign_bench.evaluation.rendering import render
     from codesign_bench.seeding import generator
     from codesign_bench.storage.policies import policy_and_task
     from codesign_bench.task import Behaviour, load_task
+    from codesign_bench.task.behaviours import RandomBehaviour
 
     if options.policy is None and options.task is None:
         raise UserError("render: give --task, or --policy, whose task is known")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -74,19 +74,21 @@ def deploy(
     folder = out / FOLDER / task.name
     path = folder / (PROTOCOL_FILE if order.protocol else TRIALS_FILE)
     (folder / PICTURES_FOLDER).mkdir(parents=True, exist_ok=True)
-    designs = {tool: deployment.design(settings.own[tool - 1]) for tool in tools}
+    unit_designs = {tool: deployment.unit_design(settings.own[tool - 1]) for tool in tools}
+    designs: dict[str, dict[str, float]] = {}
     rows = []
     for trial in planned:
         film = Film(f"{task.title}, tool {trial.tool}") if order.gifs else None
         rng = generator(order.seed, f"deploy {task.name} {trial.name}")
-        rollout = deployment.play(trial.instance, designs[trial.tool], rng, film)
+        rollout = deployment.play(trial.instance, unit_designs[trial.tool], rng, film)
+        values = deployment.episodes.designs[0].tolist()
+        designs[str(trial.tool)] = dict(zip(task.design_space.names, values, strict=True))
         where = {name: getattr(trial, name) for name in ("kind", "tool", "trial", "row", "column")}
         rows.append(row(task, settings, trial.instance, rollout, **where))
         if film is not None:
             write_bytes(folder / PICTURES_FOLDER / f"{trial.name}.gif", film.gif(task.control_period))
         say(_line(trial, rows[-1]))
     write_rows(path, rows)
-    named = [dict(zip(task.design_space.names, values.tolist(), strict=True)) for values in _units(task, designs)]
     write_json(
         path.with_suffix(SUMMARY_SUFFIX),
         {
@@ -96,16 +98,12 @@ def deploy(
             "seed": order.seed,
             "conditions": asdict(order.conditions),
             "max_steps": REAL_ROBOT.max_steps,
-            "designs": dict(zip(map(str, designs), named, strict=True)),
+            "designs": designs,
             "tools": summarise(rows),
         },
     )
     say(str(path))
     return rows
-
-
-def _units(task: Task, designs: dict[int, Any]) -> Sequence[Any]:
-    return [task.design_space.from_unit(design) for design in designs.values()]
 
 
 def _line(trial: Trial, values: dict[str, Any]) -> str:

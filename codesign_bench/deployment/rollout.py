@@ -14,10 +14,11 @@ import numpy as np
 from codesign_bench.deployment.conditions import Conditions, Physics
 from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 from codesign_bench.task import Behaviour, Floats, Singles, Task
+from codesign_bench.task.behaviours import GivenDesigns
 from codesign_bench.task.episodes import Episodes
+from codesign_bench.task.play import first_observations, play
 from codesign_bench.task.robot import ArmReport
 
-SLOT = np.array([0])
 METRE = "m"
 
 
@@ -46,16 +47,15 @@ class Deployment:
         self.episodes = Episodes(task, 1, simulator=self.simulator)
         self._lengths = np.array([unit == METRE for unit in task.state_space.units])
 
-    def design(self, instance: Floats) -> Floats:
+    def unit_design(self, instance: Floats) -> Floats:
         """Return the design (D,) in [-1, 1] that the policy makes for an instance (I,), measured without noise."""
-        self.episodes.begin(SLOT, instance[None])
-        design: Floats = np.clip(np.asarray(self.policy.design(self.episodes.observation)[0], dtype=np.float64), -1, 1)
-        return design
+        (design,) = np.asarray(self.policy.design(first_observations(self.episodes, instance[None])), dtype=np.float64)
+        return np.asarray(design)
 
     def play(
         self,
         instance: Floats,
-        design: Floats,
+        unit_design: Floats,
         rng: np.random.Generator,
         watch: Callable[[Episodes], None] | None = None,
     ) -> Rollout:
@@ -63,25 +63,22 @@ class Deployment:
 
         Args:
             instance: in the instance space's units.
-            design: the tool, whatever instance it was made for.
+            unit_design: the tool, whatever instance it was made for.
             rng: draws noise and physics.
             watch: called right after the design step and after every control step.
         """
-        episodes, physics = self.episodes, Physics.draw(self.conditions, rng)
-        episodes.begin(SLOT, instance[None])
-        episodes.design(SLOT, design[None])
-        self.simulator.perturb(0, physics.friction, physics.mass)
+        physics, simulator = Physics.draw(self.conditions, rng), self.simulator
         seen: deque[Singles] = deque(maxlen=self.conditions.latency + 1)
-        steps, over = 0, False
-        if watch is not None:
-            watch(episodes)
-        while not over and steps < REAL_ROBOT.max_steps:
-            control = np.asarray(self.policy.act(self._observe(seen, rng)), dtype=np.float64)
-            _, terminated, truncated = episodes.control(SLOT, control)
-            steps, over = steps + 1, bool(terminated[0] | truncated[0])
+        behaviour = GivenDesigns(unit_design[None], self.policy)
+        steps = 0
+        for turn in play(self.episodes, behaviour, instance[None], lambda *_: self._observe(seen, rng)):
+            if turn.step == 0:
+                simulator.perturb(0, physics.friction, physics.mass)
             if watch is not None:
-                watch(episodes)
-        simulator = self.simulator
+                watch(self.episodes)
+            steps = turn.step
+            if steps == REAL_ROBOT.max_steps:
+                break
         return Rollout(
             success=bool(simulator.success[0]),
             failure=bool(simulator.failure[0]),

@@ -13,6 +13,7 @@ import numpy as np
 
 from codesign_bench.task import Behaviour, Booleans, Floats, Task
 from codesign_bench.task.episodes import Episodes, Tradeoff, portions
+from codesign_bench.task.play import play
 
 
 @dataclass(frozen=True)
@@ -63,28 +64,21 @@ def evaluate(
 def _play(task: Task, policy: Behaviour, tradeoff: Tradeoff | None, instances: Floats) -> Evaluation:
     """Run one episode on each of `instances` (N, I) in one simulator."""
     count = len(instances)
-    slots = np.arange(count)
     episodes = Episodes(task, count, tradeoff)
-    episodes.begin(slots, instances)
-    designs = np.clip(np.asarray(policy.design(episodes.observation), dtype=np.float64), -1.0, 1.0)
-    episodes.design(slots, designs)
     returns, lengths, effort = np.zeros(count), np.zeros(count), np.zeros(count)
-    while slots.size:
-        controls = np.asarray(policy.act(episodes.observation[slots]), dtype=np.float64)
-        reward, terminated, truncated = episodes.control(slots, controls)
-        returns[slots] += reward
-        lengths[slots] += 1
-        effort[slots] += task.effort(np.clip(controls, -1.0, 1.0))
-        slots = slots[~(terminated | truncated)]
-    physical = task.design_space.from_unit(designs)
+    for turn in play(episodes, policy, instances):
+        if turn.step:
+            returns[turn.slots] += turn.reward
+            lengths[turn.slots] += 1
+            effort[turn.slots] += task.effort(turn.controls)
     return Evaluation(
         instances=instances,
-        designs=physical,
+        designs=episodes.designs,
         returns=returns,
         successes=episodes.success(np.arange(count)).copy(),
         lengths=lengths,
         outcomes=episodes.simulator.outcome.copy(),
-        material=task.material(physical),
+        material=task.material(episodes.designs),
         effort=effort / np.maximum(lengths, 1.0),
     )
 

@@ -20,7 +20,8 @@ from codesign_bench.seeding import generator
 from codesign_bench.storage.files import write_bytes
 from codesign_bench.storage.policies import load_policy
 from codesign_bench.storage.results import DEFAULT_VARIANT, DONE, POLICY_FILE, find_cells
-from codesign_bench.task import EVALUATION_SEED, Behaviour, Floats, Singles, Task, load_task
+from codesign_bench.task import EVALUATION_SEED, Floats, Task, load_task
+from codesign_bench.task.behaviours import Idle
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,21 +32,6 @@ RIM = 0.1
 INSTANCES = 64
 """Instances drawn around the region (ours)."""
 COLUMNS = ("task", "method", "seed", "instance", "return", "success")
-
-
-class Idle(Behaviour):
-    """The tool in the middle of the design space, held still."""
-
-    def __init__(self, task: Task) -> None:
-        self.sizes = task.design_space.size, task.control_space.size
-
-    def design(self, observation: Singles) -> Singles:
-        """Return (B, D) zeros."""
-        return np.zeros((*np.shape(observation)[:-1], self.sizes[0]), dtype=np.float32)
-
-    def act(self, observation: Singles) -> Singles:
-        """Return (B, C) zeros."""
-        return np.zeros((*np.shape(observation)[:-1], self.sizes[1]), dtype=np.float32)
 
 
 def outside_instances(task: Task) -> Floats:

@@ -15,8 +15,9 @@ from PIL import Image, ImageDraw
 
 from codesign_bench.errors import UserError
 from codesign_bench.storage.files import write_bytes
-from codesign_bench.task import Behaviour, Frame, Singles, Task
+from codesign_bench.task import Behaviour, Frame, Task
 from codesign_bench.task.episodes import Episodes
+from codesign_bench.task.play import play
 
 SUFFIXES = (".gif", ".png")
 FRAMES_PER_SECOND = 15.0
@@ -29,31 +30,6 @@ SHEET_SAMPLES = 40
 """A picture's moments are chosen among about so many, evenly spread over the horizon."""
 CAPTION_PIXELS = 16
 CAPTION_COLOUR, PAPER = "#202020", "#ffffff"
-
-
-class RandomBehaviour(Behaviour):
-    """Uniformly random tools, and controls that are drawn anew every few steps, so that tools travel."""
-
-    HELD_STEPS = 10
-
-    def __init__(self, task: Task, rng: np.random.Generator) -> None:
-        self.task, self.rng = task, rng
-        self._control: Singles = np.zeros((0, task.control_space.size), dtype=np.float32)
-        self._steps = 0
-
-    def design(self, observation: Singles) -> Singles:
-        """Return random designs."""
-        return self._uniform(observation, self.task.design_space.size)
-
-    def act(self, observation: Singles) -> Singles:
-        """Return random controls, the same for a while."""
-        if self._steps % self.HELD_STEPS == 0 or len(self._control) != len(observation):
-            self._control = self._uniform(observation, self.task.control_space.size)
-        self._steps += 1
-        return self._control
-
-    def _uniform(self, observation: Singles, size: int) -> Singles:
-        return self.rng.uniform(-1.0, 1.0, size=(*observation.shape[:-1], size)).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -76,7 +52,7 @@ def render(task: Task, behaviour: Behaviour, path: Path, episodes: int = 4) -> s
         raise UserError(f"--out {path}: pictures end in {' or '.join(SUFFIXES)}")
     animated = path.suffix.lower() == ".gif"
     stride = _stride(task) if animated else max(1, task.horizon // SHEET_SAMPLES)
-    moments = list(_play(task, behaviour, episodes, stride))
+    moments = list(_moments(task, behaviour, episodes, stride))
     solved = sum("success" in caption for caption in moments[-1].captions)
     content = animation(moments, stride * task.control_period) if animated else _sheet(moments)
     try:
@@ -87,36 +63,30 @@ def render(task: Task, behaviour: Behaviour, path: Path, episodes: int = 4) -> s
     return f"{path}: {solved} of {len(moments[-1].captions)} episodes solved"
 
 
-def _play(task: Task, behaviour: Behaviour, count: int, stride: int) -> Iterator[Moment]:
+def _moments(task: Task, behaviour: Behaviour, count: int, stride: int) -> Iterator[Moment]:
     """Play the first `count` evaluation instances side by side and yield every `stride`-th step and every end."""
     instances = task.evaluation_instances()[:count]
-    slots = np.arange(len(instances))
-    episodes = Episodes(task, len(slots))
-    episodes.begin(slots, instances)
-    episodes.design(slots, np.asarray(behaviour.design(episodes.observation), dtype=np.float64))
-    total, active = np.zeros(len(slots)), np.ones(len(slots), dtype=bool)
-    frames: list[Frame] = [_frame(task, episodes, slot) for slot in slots.tolist()]
-    yield Moment(frames, _captions(episodes, total), [False] * len(slots))
-    for step in range(1, task.horizon + 1):
-        running = slots[active]
-        controls = np.asarray(behaviour.act(episodes.observation), dtype=np.float64)[active]
-        reward, terminated, truncated = episodes.control(running, controls)
-        total[running] += reward
-        over = [not running for running in active.tolist()]
-        active[running] = ~(terminated | truncated)
-        if step % stride == 0 or not active[running].all():
-            drawn = {slot: _frame(task, episodes, slot) for slot in running.tolist()}
-            frames = [drawn.get(slot, frame) for slot, frame in enumerate(frames)]
-            yield Moment(frames, _captions(episodes, total), over)
-        if not active.any():
-            return
+    episodes = Episodes(task, len(instances))
+    total, over = np.zeros(len(instances)), np.zeros(len(instances), dtype=bool)
+    frames: dict[int, Frame] = {}
+    for turn in play(episodes, behaviour, instances):
+        total[turn.slots] += turn.reward
+        if turn.step % stride == 0 or turn.over.any():
+            frames |= {slot: render_slot(episodes, slot) for slot in turn.slots.tolist()}
+            yield Moment([frames[slot] for slot in sorted(frames)], _captions(episodes, total), over.tolist())
+        over[turn.slots] = turn.over
 
 
-def _frame(task: Task, episodes: Episodes, slot: int) -> Frame:
+def render_slot(episodes: Episodes, slot: int) -> Frame:
+    """Return a picture of the scene in a slot.
+
+    Raises:
+        UserError: the task draws no pictures.
+    """
     try:
         return episodes.simulator.render(slot)
     except NotImplementedError:
-        raise UserError(f"task '{task.name}' draws no pictures") from None
+        raise UserError(f"task '{episodes.task.name}' draws no pictures") from None
 
 
 def _captions(episodes: Episodes, total: np.ndarray) -> list[str]:

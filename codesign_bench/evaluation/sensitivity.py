@@ -21,7 +21,10 @@ from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.seeding import generator
 from codesign_bench.storage.files import write_bytes
 from codesign_bench.storage.results import open_folder
-from codesign_bench.task import EVALUATION_SEED, Behaviour, Floats, Singles, Task, load_task, task_names
+from codesign_bench.task import EVALUATION_SEED, Floats, Task, load_task, task_names
+from codesign_bench.task.behaviours import GivenDesigns
+from codesign_bench.task.episodes import Episodes
+from codesign_bench.task.play import first_observations
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,27 +42,12 @@ COLUMNS = ("task", "tool", "kind", "goal", "own", "outcome", "return", "success"
 """`own` marks a scripted tool on the goal that it was made for."""
 
 
-class GivenTools(Behaviour):
-    """A controller with tools given beforehand, one per episode."""
-
-    def __init__(self, designs: Floats, controller: Behaviour) -> None:
-        self.designs, self.controller = designs.astype(np.float32), controller
-
-    def design(self, observation: Singles) -> Singles:
-        """Return the given designs (B, D), whatever the observation."""
-        return self.designs
-
-    def act(self, observation: Singles) -> Singles:
-        """Return the controller's control."""
-        return self.controller.act(observation)
-
-
 def tools_of(task: Task, goals: Floats, random_tools: int = RANDOM_TOOLS) -> Floats:
     """Return (K, D) normalised designs: random ones, then the script's own for each of `goals` (G, I)."""
     rng = generator(EVALUATION_SEED, f"tools for {task.name}")
     random = rng.uniform(-1.0, 1.0, size=(random_tools, task.design_space.size))
-    episodes_designs = _scripted_designs(task, goals)
-    return np.concatenate([random, episodes_designs])
+    scripted = np.asarray(task.script().design(first_observations(Episodes(task, len(goals)), goals)), dtype=np.float64)
+    return np.concatenate([random, scripted])
 
 
 def measure(name: str, random_tools: int = RANDOM_TOOLS, goals: int = GOALS, jobs: int = 1) -> pd.DataFrame:
@@ -124,16 +112,8 @@ def load_or_measure(results: Path, say: Callable[[str], None], measure_missing: 
     return pd.concat(frames, ignore_index=True)
 
 
-def _scripted_designs(task: Task, goals: Floats) -> Floats:
-    from codesign_bench.task.episodes import Episodes
-
-    episodes, slots = Episodes(task, len(goals)), np.arange(len(goals))
-    episodes.begin(slots, goals)
-    return np.asarray(task.script().design(episodes.observation), dtype=np.float64)
-
-
 def _play(name: str, designs: Floats, instances: Floats) -> tuple[Floats, Floats, Floats]:
     """Return outcome, return and success of one episode per row."""
     task = load_task(name)
-    evaluation = evaluate(task, GivenTools(designs, task.script()), instances=instances)
+    evaluation = evaluate(task, GivenDesigns(designs, task.script()), instances=instances)
     return evaluation.outcomes, evaluation.returns, evaluation.successes.astype(np.float64)

@@ -10,13 +10,12 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from codesign_bench.errors import UserError
 from codesign_bench.storage.policies import load_policy
 from codesign_bench.storage.results import DEFAULT_VARIANT, DONE, find_cells
 from codesign_bench.task import load_task
 from codesign_bench.task.episodes import Episodes
+from codesign_bench.task.play import designed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,9 +65,8 @@ def timing_frame(results: Path) -> pd.DataFrame:
 def inference_seconds(folder: Path, task_name: str) -> float:
     """Return the median time of one call of the cell's policy in the control phase, on one observation, in s."""
     task, policy = load_task(task_name), load_policy(folder)
-    episodes, slot = Episodes(task, 1), np.array([0])
-    episodes.begin(slot, task.evaluation_instances()[:1])
-    episodes.design(slot, np.asarray(policy.design(episodes.observation), dtype=np.float64))
+    episodes = Episodes(task, 1)
+    designed(episodes, policy, task.evaluation_instances()[:1])
     observation = episodes.observation[0].copy()
     seconds = []
     for _ in range(CALLS):

@@ -22,6 +22,7 @@ from codesign_bench.storage.files import write_bytes, write_json
 from codesign_bench.storage.results import write_rows
 from codesign_bench.task import Behaviour, Box, Floats, Task
 from codesign_bench.task.episodes import Episodes, portions
+from codesign_bench.task.play import designed
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -142,13 +143,8 @@ def file_content(mesh: Trimesh, kind: str) -> bytes:
 
 def _designs(task: Task, policy: Behaviour, instances: Floats) -> Floats:
     """Return the tools (N, D), in the design space's units, that `policy` designs for `instances` (N, I)."""
-    parts = []
-    for part in portions(len(instances), task):
-        some = instances[part]
-        episodes = Episodes(task, len(some))
-        episodes.begin(np.arange(len(some)), some)
-        parts.append(task.design_space.from_unit(policy.design(episodes.observation)))
-    return np.concatenate(parts)
+    parts = portions(len(instances), task)
+    return np.concatenate([designed(Episodes(task, len(part)), policy, instances[part]) for part in parts])
 
 
 def _open(out: Path, files: Iterable[str]) -> None:

@@ -15,10 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codesign_bench.errors import UserError
+from codesign_bench.evaluation.rendering import render_slot
 from codesign_bench.registry import names
 from codesign_bench.storage.results import load_evaluations
 from codesign_bench.task import Box, Floats, Frame, Task, load_task
+from codesign_bench.task.behaviours import GivenDesigns, Idle
 from codesign_bench.task.episodes import Episodes
+from codesign_bench.task.play import designed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -150,15 +153,10 @@ def _entries(cell: pd.DataFrame, kind: str, space: Box) -> Floats:
 
 def _draw(task: Task, instances: Floats, designs: Floats) -> list[Frame]:
     """Return a picture of each instance (N, I) with its tool."""
-    frames = []
-    slot, episodes = np.array([0]), Episodes(task, 1)
-    for instance, design in zip(instances, task.design_space.to_unit(designs), strict=True):
-        episodes.begin(slot, instance[None])
-        episodes.design(slot, design[None])
-        try:
-            frames.append(episodes.simulator.render(0))
-        except NotImplementedError:
-            raise UserError(f"task '{task.name}' draws no pictures") from None
+    frames, episodes, idle = [], Episodes(task, 1), Idle(task)
+    for instance, unit_design in zip(instances, task.design_space.to_unit(designs), strict=True):
+        designed(episodes, GivenDesigns(unit_design[None], idle), instance[None])
+        frames.append(render_slot(episodes, 0))
     return frames
 
 

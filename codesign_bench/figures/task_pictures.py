@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.evaluation.rendering import render_slot
 from codesign_bench.task import Task, load_task
 from codesign_bench.task.episodes import Episodes
+from codesign_bench.task.play import play
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,15 +52,9 @@ def _at_work(task: Task) -> dict[str, Any]:
     best = int(evaluation.returns.argmax())
     steps = int(evaluation.lengths[best])
     step = max(1, round(MOMENT * steps))
-    slot, episodes = np.array([0]), Episodes(task, 1)
-    episodes.begin(slot, instances[best : best + 1])
-    episodes.design(slot, np.asarray(script.design(episodes.observation), dtype=np.float64))
-    for _ in range(step):
-        episodes.control(slot, np.asarray(script.act(episodes.observation), dtype=np.float64))
-    try:
-        picture = episodes.simulator.render(0)
-    except NotImplementedError:
-        raise UserError(f"task '{task.name}' draws no pictures") from None
+    episodes = Episodes(task, 1)
+    next(turn for turn in play(episodes, script, instances[best : best + 1]) if turn.step == step)
+    picture = render_slot(episodes, 0)
     return {
         "task": task.name,
         "title": task.title,

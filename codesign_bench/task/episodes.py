@@ -13,6 +13,9 @@ from codesign_bench.task.simulator import Simulator
 from codesign_bench.task.spaces import Booleans, Floats, Singles, Slots
 from codesign_bench.task.task import Task
 
+TRADEOFF_TERM = "tradeoff"
+"""The name of the trade-off's share among the terms of a reward."""
+
 
 @dataclass(frozen=True)
 class Tradeoff:
@@ -49,6 +52,10 @@ class Episodes:
         self.observation: Singles = np.zeros((num_slots, self.layout.size), dtype=np.float32)
         self.elapsed = np.zeros(num_slots, dtype=np.intp)
         """(B,) control steps since the design step."""
+        self.designs: Floats = np.zeros((num_slots, task.design_space.size))
+        """(B, D) designs of the tools, in the design space's units."""
+        self.reward_terms: dict[str, Floats] = {}
+        """Name -> (B,): what the last control step's reward is the sum of; empty where the task names no terms."""
         self._material = np.zeros(num_slots)
         space = task.state_space
         self._state_low, self._state_high = np.array(space.low, np.float32), np.array(space.high, np.float32)
@@ -62,17 +69,19 @@ class Episodes:
         self.observation[slots, self.layout.phase] = (1.0, 0.0, 0.0)
         self._observe(slots)
 
-    def design(self, slots: Slots, designs: Floats) -> None:
-        """Take the design step with `designs` (b, D), clipped to [-1, 1].
+    def design(self, slots: Slots, unit_designs: Floats) -> None:
+        """Take the design step with `unit_designs` (b, D), normalised, which are clipped to [-1, 1].
+
+        Here, and nowhere else, a normalised design becomes one in the design space's units, which `designs` then holds.
 
         Raises:
             ValueError: a design is not finite.
         """
-        clipped = _finite(designs, "design")
-        physical = self.task.design_space.from_unit(clipped)
-        self.simulator.build(slots, physical)
+        clipped = _finite(unit_designs, "design")
+        designs = self.designs[slots] = self.task.design_space.from_unit(clipped)
+        self.simulator.build(slots, designs)
         if self.tradeoff is not None:
-            self._material[slots] = self.task.material(physical)
+            self._material[slots] = self.task.material(designs)
         self.observation[slots, self.layout.design] = clipped
         self.observation[slots, self.layout.phase] = (0.0, 1.0, 0.0)
         self._observe(slots)
@@ -91,8 +100,11 @@ class Episodes:
         simulator.step(slots, clipped)
         self.elapsed[slots] += 1
         reward = simulator.reward[slots]
+        self.reward_terms.update(simulator.reward_terms)
         if self.tradeoff is not None:
-            reward = reward + self.tradeoff.reward(self._material[slots], self.task.effort(clipped))
+            saved = self.tradeoff.reward(self._material[slots], self.task.effort(clipped))
+            self.reward_terms.setdefault(TRADEOFF_TERM, np.zeros(self.num_slots))[slots] = saved
+            reward = reward + saved
         self.observation[slots, self.layout.phase.stop - 1] = self.elapsed[slots] / self.task.horizon
         self._observe(slots)
         terminated = simulator.success[slots] | simulator.failure[slots]

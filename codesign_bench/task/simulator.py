@@ -59,6 +59,8 @@ class Simulator(ABC):
         """(B, S) task state, written in place."""
         self.reward: Floats = np.zeros(num_slots)
         """(B,) reward of the last step."""
+        self.reward_terms: dict[str, Floats] = {}
+        """Name -> (B,): what the last step's reward is the sum of, as far as the task names it."""
         self.success: Booleans = np.zeros(num_slots, dtype=bool)
         """(B,) whether the task is solved; ends the episode."""
         self.failure: Booleans = np.zeros(num_slots, dtype=bool)
@@ -77,6 +79,14 @@ class Simulator(ABC):
     @abstractmethod
     def step(self, slots: Slots, controls: Floats) -> None:
         """Advance `slots` by one control step with `controls` (b, C) in [-1, 1]; write state, reward and both ends."""
+
+    def set_reward(self, slots: Slots, **terms: Floats | float) -> None:
+        """Reward `slots` (b,) by the sum of named terms, (b,) each, added up in the order given."""
+        total: Floats | float = 0.0
+        for index, (name, values) in enumerate(terms.items()):
+            self.reward_terms.setdefault(name, np.zeros(self.num_slots))[slots] = values
+            total = values if index == 0 else total + values
+        self.reward[slots] = total
 
     def advance(self, slots: Slots) -> None:
         """Make the engine's own physics steps of one control step, and nothing else: the raw cost of a step.

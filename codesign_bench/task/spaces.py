@@ -49,9 +49,9 @@ class Box:
         return np.array(self.low, dtype=np.float64), np.array(self.high, dtype=np.float64)
 
     def from_unit(self, values: ArrayLike) -> Floats:
-        """Map (..., size) values in [-1, 1] to the entries' units; values outside are clipped."""
+        """Map (..., size) values in [-1, 1] to the entries' units."""
         low, high = self.bounds
-        return low + (np.clip(np.asarray(values, dtype=np.float64), -1.0, 1.0) + 1.0) * 0.5 * (high - low)
+        return low + (np.asarray(values, dtype=np.float64) + 1.0) * 0.5 * (high - low)
 
     def to_unit(self, values: ArrayLike) -> Floats:
         """Map (..., size) values in the entries' units to [-1, 1]."""

@@ -15,8 +15,8 @@ from codesign_bench import load_task, task_names
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
-from codesign_bench.evaluation.rendering import RandomBehaviour
 from codesign_bench.fabrication.export import Order, export
+from codesign_bench.task.behaviours import RandomBehaviour
 
 REFERENCE = Path(__file__).resolve().parents[2] / "results" / "reference"
 PUSH = REFERENCE / "push" / "gnn_ppo" / "default" / "seed-00"

@@ -15,9 +15,9 @@ import pybullet
 import pytest
 
 from codesign_bench.evaluation.evaluate import evaluate
-from codesign_bench.evaluation.sensitivity import GivenTools
 from codesign_bench.registry import load_module
 from codesign_bench.task import Floats, load_task
+from codesign_bench.task.behaviours import GivenDesigns
 from codesign_bench.task.episodes import Episodes
 
 scoop: Any = load_module("tasks", "scoop_3d")
@@ -189,7 +189,7 @@ def test_no_tool_of_the_script_serves_all_numbers() -> None:
     numbers = np.arange(scoop.WANTED[0], scoop.WANTED[1] + 1)
     instances = np.stack([numbers, np.full(7, 9.0)], axis=1)
     for tool in (2, 6):
-        given = GivenTools(np.repeat(tool_for(tool), 7, axis=0), task.script())
+        given = GivenDesigns(np.repeat(tool_for(tool), 7, axis=0), task.script())
         assert evaluate(task, given, instances=instances).successes.mean() < 0.5
 
 

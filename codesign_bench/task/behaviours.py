@@ -1,0 +1,67 @@
+"""Behaviours that nobody trained: designs given beforehand, random ones, and none at all.
+
+Shapes: `B` batch, `O` observation, `D` design, `C` control.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from codesign_bench.task.behaviour import Behaviour
+from codesign_bench.task.spaces import Floats, Singles
+from codesign_bench.task.task import Task
+
+
+class GivenDesigns(Behaviour):
+    """A controller with designs given beforehand, one per episode."""
+
+    def __init__(self, unit_designs: Floats, controller: Behaviour) -> None:
+        self.unit_designs, self.controller = unit_designs.astype(np.float32), controller
+
+    def design(self, observation: Singles) -> Singles:
+        """Return the given designs (B, D), whatever the observation."""
+        return self.unit_designs
+
+    def act(self, observation: Singles) -> Singles:
+        """Return the controller's control."""
+        return self.controller.act(observation)
+
+
+class Idle(Behaviour):
+    """The tool in the middle of the design space, held still."""
+
+    def __init__(self, task: Task) -> None:
+        self.sizes = task.design_space.size, task.control_space.size
+
+    def design(self, observation: Singles) -> Singles:
+        """Return (B, D) zeros."""
+        return np.zeros((*np.shape(observation)[:-1], self.sizes[0]), dtype=np.float32)
+
+    def act(self, observation: Singles) -> Singles:
+        """Return (B, C) zeros."""
+        return np.zeros((*np.shape(observation)[:-1], self.sizes[1]), dtype=np.float32)
+
+
+class RandomBehaviour(Behaviour):
+    """Uniformly random tools, and controls that are drawn anew every few steps, so that tools travel."""
+
+    HELD_STEPS = 10
+
+    def __init__(self, task: Task, rng: np.random.Generator) -> None:
+        self.task, self.rng = task, rng
+        self._control: Singles = np.zeros((0, task.control_space.size), dtype=np.float32)
+        self._steps = 0
+
+    def design(self, observation: Singles) -> Singles:
+        """Return random designs."""
+        return self._uniform(observation, self.task.design_space.size)
+
+    def act(self, observation: Singles) -> Singles:
+        """Return random controls, the same for a while."""
+        if self._steps % self.HELD_STEPS == 0 or len(self._control) != len(observation):
+            self._control = self._uniform(observation, self.task.control_space.size)
+        self._steps += 1
+        return self._control
+
+    def _uniform(self, observation: Singles, size: int) -> Singles:
+        return self.rng.uniform(-1.0, 1.0, size=(*observation.shape[:-1], size)).astype(np.float32)

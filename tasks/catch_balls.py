@@ -5,6 +5,8 @@ Shapes: `b` slots a call names, `I` = 10 instance, `D` = 5 design, `C` = 1 contr
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 import pymunk
 
@@ -13,6 +15,7 @@ from codesign_bench.task import (
     Behaviour,
     Booleans,
     Box,
+    ByProfile,
     Floats,
     Quantity,
     Simulator,
@@ -169,6 +172,10 @@ class CatchBalls(Task):
         },
     )
 
+    run_settings: ClassVar[ByProfile] = {
+        "quick": {"steps": 400_000, "tradeoff_scale": 0.01},
+        "laptop": {"tradeoff_scale": 0.01},
+    }
     outcome = Quantity("balls held", "balls")
     soundness = Soundness(
         overlap=LINK_HALF_WIDTH,

@@ -16,6 +16,7 @@ from codesign_bench.task import (
     Behaviour,
     Booleans,
     Box,
+    ByProfile,
     Floats,
     Quantity,
     Simulator,
@@ -200,6 +201,10 @@ class LiftCup(Task):
         cup_velocity_z=(-5.0, 5.0, "m/s"),
     )
 
+    run_settings: ClassVar[ByProfile] = {
+        "quick": {"steps": 400_000},
+        "laptop": {"steps": 700_000},
+    }
     outcome = Quantity("height of the cup's lowest corner while upright", "m")
     max_slots = MAX_SLOTS
     soundness = Soundness(overlap=WALL, speed=4.0, outcome_change=0.01)

@@ -19,6 +19,7 @@ from codesign_bench.task import (
     Behaviour,
     Booleans,
     Box,
+    ByProfile,
     Floats,
     Physics,
     Quantity,
@@ -228,6 +229,10 @@ class Scoop(Task):
         **{f"wants_{number}": (0.0, 1.0, "") for number in range(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)},
     )
 
+    run_settings: ClassVar[ByProfile] = {
+        "quick": {"steps": 260_000},
+        "laptop": {"steps": 600_000},
+    }
     outcome = Quantity("balls held out of the reservoir", "balls")
     soundness = Soundness(overlap=MAX_BALL_SPEED * CLOCK.period, speed=MAX_BALL_SPEED, outcome_change=0.3, chaotic=True)
 

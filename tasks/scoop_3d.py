@@ -16,6 +16,7 @@ from codesign_bench.task import (
     Behaviour,
     Booleans,
     Box,
+    ByProfile,
     Floats,
     Physics,
     Quantity,
@@ -241,6 +242,7 @@ class Scoop3D(Task):
         highest_ball=(0.0, 0.5, "m"),
         **{f"wants_{count}": (0.0, 1.0, "1") for count in range(WANTED[0], WANTED[1] + 1)},
     )
+    run_settings: ClassVar[ByProfile] = {"laptop": {"steps": 500_000, "evaluations": 10}}
     outcome = Quantity("balls held above the line", "balls")
     max_slots = MAX_SLOTS
     # Balls that meet at up to 2.8 m/s overlap for a step of 1/120 s, also right after they were poured; tools start

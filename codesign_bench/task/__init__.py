@@ -9,7 +9,7 @@ from codesign_bench.task.behaviour import Behaviour
 from codesign_bench.task.loading import deployable_tasks, load_task, task_names
 from codesign_bench.task.simulator import Physics, Simulator, Soundness
 from codesign_bench.task.spaces import Booleans, Box, Floats, Frame, Layout, Quantity, Singles, Slots
-from codesign_bench.task.task import EVALUATION_SEED, Task
+from codesign_bench.task.task import EVALUATION_SEED, ByProfile, Task
 from codesign_bench.task.tool import BoxPart, PlanarPart, ToolGraph, ToolPart
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "Booleans",
     "Box",
     "BoxPart",
+    "ByProfile",
     "Floats",
     "Frame",
     "Layout",

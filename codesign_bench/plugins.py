@@ -5,15 +5,20 @@ from __future__ import annotations
 import importlib
 import inspect
 import os
+from types import ModuleType
 
 from codesign_bench.errors import UserError
 from codesign_bench.method import Method
 from codesign_bench.registry import IMPORTS_VARIABLE, register
+from codesign_bench.study import Study
 from codesign_bench.task import Task
 
 
 def import_modules(modules: list[str]) -> None:
-    """Import `modules` here and in every process started from here, so that they can `register` their entries.
+    """Import `modules` here and in every process started from here, and register what they define.
+
+    A task and a method are classes, known by their `name`; a study is what the module calls `STUDY`; a module with
+    `TITLE`, `data` and `draw` is a figure, known by the last part of the module's name.
 
     Raises:
         UserError: a module cannot be found.
@@ -21,21 +26,24 @@ def import_modules(modules: list[str]) -> None:
     known = [name for name in os.environ.get(IMPORTS_VARIABLE, "").split(",") if name]
     for name in known + [name for name in modules if name not in known]:
         try:
-            importlib.import_module(name)
+            module = importlib.import_module(name)
         except ModuleNotFoundError as error:
             if error.name is None or not name.startswith(error.name):
                 raise
             raise UserError(f"--import: no module named '{name}'") from error
-        _register_classes(name)
+        _register_members(module)
     os.environ[IMPORTS_VARIABLE] = ",".join(dict.fromkeys(known + modules))
 
 
-def _register_classes(module_name: str) -> None:
-    """Register the tasks and methods that an imported module defines, under the names that they give themselves."""
-    module = importlib.import_module(module_name)
+def _register_members(module: ModuleType) -> None:
+    """Register the tasks, the methods, the study and the figure that a module itself defines."""
     for member in vars(module).values():
         if not inspect.isclass(member) or inspect.isabstract(member) or member.__module__ != module.__name__:
             continue
         for group, base in (("tasks", Task), ("methods", Method)):
             if issubclass(member, base):
                 register(group, member.name, lambda member=member: member)  # type: ignore[misc]
+    if isinstance(getattr(module, "STUDY", None), Study):
+        register("studies", module.STUDY.name, lambda: module)
+    if all(hasattr(module, name) for name in ("TITLE", "data", "draw")):
+        register("paper_figs", module.__name__.rpartition(".")[2], lambda: module)

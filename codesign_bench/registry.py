@@ -35,6 +35,11 @@ def names(group: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*_files(group), *sorted(_entry_points(group)), *sorted(_registered.get(group, {})))))
 
 
+def built_in(group: str) -> tuple[str, ...]:
+    """Return the names in `group` that come with codesign-bench: the files of its folder."""
+    return _files(group)
+
+
 def in_order(group: str, found: Iterable[str]) -> list[str]:
     """Return the `found` names of `group`, each once, in the order of listings; unknown ones last, by name."""
     present, known = set(found), names(group)

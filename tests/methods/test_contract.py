@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import torch
 
+from codesign_bench.config.profiles import profiles
 from codesign_bench.config.resolve import resolve
 from codesign_bench.method import Method, Policy, load_method, method_names
 from codesign_bench.storage.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
@@ -166,6 +167,8 @@ def test_an_interrupted_method_goes_on_identically_through_a_file(
     assert_same_state(method, restored)
 
 
+@EVERY_METHOD
+@pytest.mark.parametrize("profile", profiles())
 def test_every_profile_makes_a_valid_configuration_for_every_task(name: str, profile: str) -> None:
     method_class = load_method(name)
     for task_name in task_names():

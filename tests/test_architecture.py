@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import configparser
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,11 +12,15 @@ from pathlib import Path
 
 import pytest
 
+from codesign_bench.registry import built_in
+from codesign_bench.study import DEFAULT_STUDY, load_study
+
 ROOT = Path(__file__).resolve().parent.parent
 FLAT_FOLDERS = ("methods", "tasks", "paper_figs")
 """Folders whose every file is one entry."""
 
 CORE = sorted((ROOT / "codesign_bench").rglob("*.py"))
+OUTSIDE_STUDIES = [path for path in CORE if "studies" not in path.relative_to(ROOT).parts]
 LEARNING = ROOT / "codesign_bench" / "learning"
 
 
@@ -62,8 +67,9 @@ def below(*names: str) -> tuple[str, ...]:
     return tuple(f"codesign_bench.{name}" for name in names)
 
 
-def test_the_core_knows_no_method_task_or_figure() -> None:
+def test_the_core_imports_no_method_task_figure_or_study() -> None:
     assert offences(CORE, (*below(*FLAT_FOLDERS), *FLAT_FOLDERS)) == []
+    assert offences(OUTSIDE_STUDIES, below("studies")) == []
 
 
 def test_methods_know_no_task_and_no_figure() -> None:
@@ -133,6 +139,28 @@ def imports_between(paths: list[Path], nodes: str = "all") -> dict[str, set[str]
 def test_no_module_of_the_core_imports_itself_in_a_circle() -> None:
     edges = imports_between(CORE)
     assert sorted(module for module in edges if module in reached(module, edges)) == []
+
+
+def strings(path: Path) -> Iterator[str]:
+    """Yield the string constants of a file, docstrings left out."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
+            yield node.value
+
+
+def test_the_core_names_no_method_task_or_study() -> None:
+    members = {name for group in ("methods", "tasks", "studies") for name in built_in(group)} - {DEFAULT_STUDY}
+    word = re.compile(rf"(?<![\w-])({'|'.join(sorted(members))})(?![\w-])")
+    profiles = {profile.name for name in built_in("studies") for profile in load_study(name).profiles}
+    named = [
+        f"{path.relative_to(ROOT)}: {text!r}"
+        for path in OUTSIDE_STUDIES
+        for text in strings(path)
+        if word.search(text) or text in profiles
+    ]
+    assert named == []
 
 
 @pytest.mark.parametrize("heavy", ["torch", "pybullet", "pymunk", "cma", "pandas"])

@@ -27,7 +27,7 @@ from codesign_bench.config.resolve import resolve
 from codesign_bench.console import print_table
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores, computes_in_bfloat16, host_facts, package_versions
-from codesign_bench.method import Problem, load_method
+from codesign_bench.method import Problem, load_method, method_names
 from codesign_bench.processes import thread_environment
 from codesign_bench.seeding import Streams
 from codesign_bench.storage.files import write_json
@@ -45,12 +45,12 @@ class Contestant:
 
 
 def ours(method_name: str, precision: str = "fp32") -> Callable[[Workload], Speed]:
-    """Return the measurement of one of our own PPO-based methods under the paper's networks."""
+    """Return the measurement of one of our own PPO-based methods with the networks of the work's profile."""
 
     def measure(work: Workload) -> Speed:
         method_class: Any = load_method(method_name)
         same = {"batch_size": work.batch_size, "minibatch_size": work.minibatch_size, "epochs": work.epochs}
-        config = resolve(method_class, work.task, "paper").method
+        config = resolve(method_class, work.task, work.profile).method
         config = replace(config, **same, precision=precision, kl_threshold=inf)
         learner = method_class(Problem(load_task(work.task)), config, Streams(0)).learner
         learner.use_cores(work.cores)
@@ -82,7 +82,7 @@ def operations_per_sample(method_name: str, work: Workload) -> float:
     counts, steps = [], 0
     for epochs in (1, 2):
         same = {"batch_size": work.minibatch_size, "minibatch_size": work.minibatch_size, "epochs": epochs}
-        config = replace(resolve(method_class, work.task, "paper").method, **same, kl_threshold=inf)
+        config = replace(resolve(method_class, work.task, work.profile).method, **same, kl_threshold=inf)
         learner = method_class(Problem(load_task(work.task)), config, Streams(0)).learner
         batch = learner.collect(work.minibatch_size, max(1, work.minibatch_size // (load_task(work.task).horizon + 1)))
         steps = batch.env_steps
@@ -115,16 +115,17 @@ def ceiling(work: Workload) -> dict[str, float]:
 
 
 def contestants() -> dict[str, Contestant]:
-    """Return everyone who can be measured, by name."""
+    """Return everyone who can be measured, by name: every method that learns by PPO, and the rivals."""
     from codesign_bench.benchmarks import rivals
+    from codesign_bench.learning.ppo_method import PPOMethod
 
+    learners = [name for name in method_names() if issubclass(load_method(name), PPOMethod)]
+    full = {name: Contestant(f"{name}, ours", ours(name)) for name in learners}
     reduced = {
-        "gnn_ppo_bf16": Contestant("gnn_ppo, ours, updates in bfloat16", ours("gnn_ppo", "bf16")),
-        "shared_arch_bf16": Contestant("shared_arch, ours, updates in bfloat16", ours("shared_arch", "bf16")),
+        f"{name}_bf16": Contestant(f"{name}, ours, updates in bfloat16", ours(name, "bf16")) for name in learners
     }
     return {
-        "gnn_ppo": Contestant("gnn_ppo, ours", ours("gnn_ppo")),
-        "shared_arch": Contestant("shared_arch, ours", ours("shared_arch")),
+        **full,
         **(reduced if computes_in_bfloat16() else {}),
         "stable_baselines3": Contestant(
             "stable-baselines3, its vector environment", rivals.stable_baselines3_alone, "stable_baselines3"
@@ -164,7 +165,8 @@ def bench_learner(work: Workload, names: Sequence[str], out: Path | None, consol
     rows = [(known[name].title, *_row(speed, work, top["fp32"])) for name, speed in found.items()]
     print_table(console, HEADER, rows)
     say(
-        f"{work.task}, batches of {work.batch_size:,}, minibatches of {work.minibatch_size:,}, {work.epochs} epochs, "
+        f"{work.task}, networks of the profile {work.profile}, batches of {work.batch_size:,}, "
+        f"minibatches of {work.minibatch_size:,}, {work.epochs} epochs, "
         f"{work.cores} core(s) a cell, {work.cells} cell(s) at once, medians of {work.repeats}; "
         f"matrix products: {top['fp32']:.0f} GFLOP/s in fp32, "
         f"{top['bf16']:.0f} in bf16"

@@ -12,14 +12,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from codesign_bench.benchmarks.workload import Speed, Workload, peak_megabytes
-from codesign_bench.studies.corl2023.learners import CMA_RL, LEARNERS
+from codesign_bench.benchmarks.workload import Speed, Workload, configured, peak_megabytes
 from codesign_bench.task import Task, load_task
 from codesign_bench.task.envs import ToolVectorEnv, environment_id, register_environments
 from codesign_bench.task.episodes import Episodes
 
-WIDTHS = list(CMA_RL.policy_net)
-"""The perceptrons of the paper's baselines: five layers of 256."""
 USUAL_ROLLOUT_STEPS, USUAL_MINIBATCHES = 300, 3
 """The usual way is measured over a short stretch: it is slow."""
 
@@ -48,7 +45,7 @@ def _stable_baselines3(work: Workload, environments: Any) -> Speed:
         n_steps=steps,
         batch_size=work.minibatch_size,
         n_epochs=work.epochs,
-        policy_kwargs={"net_arch": WIDTHS},
+        policy_kwargs={"net_arch": list(configured("policy_net", work))},
         device="cpu",
         seed=0,
     )
@@ -113,9 +110,9 @@ def _batched(work: Workload) -> Any:
 
 
 def usual_way(work: Workload) -> Speed:
-    """Measure the paper's networks with torch-geometric's layers on edge lists, acting on one state a call.
+    """Measure graph networks as wide as ours, made of torch-geometric's layers on edge lists.
 
-    Minibatches are lists of single graphs, joined for every update.
+    They act on one state a call; minibatches are lists of single graphs, joined for every update.
     """
     import torch
     from torch import nn
@@ -123,7 +120,7 @@ def usual_way(work: Workload) -> Speed:
     from torch_geometric.nn import GraphConv
 
     task = load_task(work.task)
-    table = LEARNERS[work.task]
+    convolution_widths: tuple[int, ...] = configured("control_gnn", work)
     layout, nodes = task.layout, task.tool_graph.num_nodes
     width = layout.goal.stop + 2 + _node_width(task)
 
@@ -132,7 +129,7 @@ def usual_way(work: Workload) -> Speed:
 
         def __init__(self, outputs: int, index_widths: tuple[int, ...]) -> None:
             super().__init__()
-            sizes = table.control_gnn
+            sizes = convolution_widths
             self.first = nn.Linear(width, sizes[0])
             self.convolutions = nn.ModuleList(
                 GraphConv(a, b) for a, b in zip((sizes[0], *sizes[:-1]), sizes, strict=True)
@@ -151,7 +148,8 @@ def usual_way(work: Workload) -> Speed:
             per_node = x.view(-1, nodes, x.shape[-1])
             return torch.stack([head(per_node[:, node]) for node, head in enumerate(self.heads)], dim=1)[:, 0]
 
-    policy, value = Net(task.control_space.size, table.control_index_mlp), Net(1, (512, 256))
+    policy = Net(task.control_space.size, configured("control_index_mlp", work))
+    value = Net(1, configured("value_mlp", work))
     optimizers = [torch.optim.Adam(net.parameters(), lr=1e-4) for net in (policy, value)]
     pairs = task.tool_graph.edges + tuple((b, a) for a, b in task.tool_graph.edges)
     edges = torch.tensor(pairs, dtype=torch.long).t().reshape(2, -1)

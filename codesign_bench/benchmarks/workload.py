@@ -1,19 +1,32 @@
-"""What is measured of a learner, and on what work."""
+"""What is measured of a learner, on what work, and with which networks."""
 
 from __future__ import annotations
 
 import re
 import resource
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
+
+from codesign_bench.config.resolve import resolve
+from codesign_bench.method import load_method, method_names
+from codesign_bench.study import DEFAULT_STUDY, load_study
+from codesign_bench.task import task_names
+
+
+def study_profile() -> str:
+    """Return the profile that the default study brings: its publication's networks."""
+    return load_study(DEFAULT_STUDY).profiles[0].name
 
 
 @dataclass(frozen=True)
 class Workload:
     """What every contestant does."""
 
-    task: str = "push"
+    task: str = field(default_factory=lambda: task_names()[0])
+    profile: str = field(default_factory=study_profile)
+    """Whose networks everyone has."""
     batch_size: int = 50_000
     minibatch_size: int = 2_000
     epochs: int = 10
@@ -41,6 +54,19 @@ class Speed:
     def end_to_end(self, epochs: int) -> float:
         """Return environment steps per second of rollout and update together."""
         return 1.0 / (1.0 / self.rollout + epochs / self.update)
+
+
+def configured(setting: str, work: Workload) -> Any:
+    """Return a setting of the networks, as the first method that has it gets it for the work's task and profile.
+
+    Raises:
+        LookupError: no method has it.
+    """
+    for name in method_names():
+        config = resolve(load_method(name), work.task, work.profile).method
+        if hasattr(config, setting):
+            return getattr(config, setting)
+    raise LookupError(f"no method has a setting '{setting}'")
 
 
 def peak_megabytes() -> float:

@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from codesign_bench.cli.arguments import ALL, check_at_least_one, chosen_tasks, integer
+from codesign_bench.config.profiles import profile_named
 from codesign_bench.errors import unknown_name
 
 HELP = "measure speed on this machine"
@@ -20,7 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     tasks.add_argument("--task", nargs="+", default=[ALL], metavar="T", help="names, or all (default)")
     tasks.add_argument("--seconds", type=float, default=5.0, metavar="S", help="for each task; default: 5")
     learner = kinds.add_parser("learner", help="our learners beside others'", allow_abbrev=False)
-    learner.add_argument("--task", default="push", metavar="T", help="default: push")
+    learner.add_argument("--task", metavar="T", help="default: the first that `list` shows")
+    learner.add_argument("--profile", metavar="P", help="whose networks; default: the paper's")
     learner.add_argument("--cores", type=integer, default=1, metavar="N", help="default: 1")
     learner.add_argument("--cells", type=integer, default=1, metavar="N", help="cells at once; default: 1")
     learner.add_argument("--batch-size", type=integer, default=50_000, metavar="N", help="default: 50000")
@@ -46,8 +48,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for name in wanted:
         if name not in contestants():
             raise unknown_name("learner", name, contestants())
+    if options.profile is not None:
+        profile_named(options.profile)
+    named = {"task": options.task, "profile": options.profile}
     work = Workload(
-        task=options.task,
+        **{name: value for name, value in named.items() if value is not None},
         batch_size=options.batch_size,
         minibatch_size=options.minibatch_size,
         epochs=options.epochs,

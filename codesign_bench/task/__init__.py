@@ -8,7 +8,7 @@ of it, `robot.py` what deployment on an arm asks of a task.
 from codesign_bench.task.behaviour import Behaviour
 from codesign_bench.task.loading import deployable_tasks, load_task, task_names
 from codesign_bench.task.simulator import Physics, Simulator, Soundness
-from codesign_bench.task.spaces import Booleans, Box, Floats, Frame, Layout, Quantity, Singles, Slots
+from codesign_bench.task.spaces import Booleans, Box, Floats, Frame, Layout, Observed, Quantity, Singles, Slots, Span
 from codesign_bench.task.task import EVALUATION_SEED, Task
 from codesign_bench.task.tool import BoxPart, PlanarPart, ToolGraph, ToolPart
 
@@ -21,6 +21,7 @@ __all__ = [
     "Floats",
     "Frame",
     "Layout",
+    "Observed",
     "Physics",
     "PlanarPart",
     "Quantity",
@@ -28,6 +29,7 @@ __all__ = [
     "Singles",
     "Slots",
     "Soundness",
+    "Span",
     "Task",
     "ToolGraph",
     "ToolPart",

@@ -58,8 +58,7 @@ class Task(ABC):
     @property
     def goal_space(self) -> Box:
         """The leading, visible part of the instance space."""
-        space, count = self.instance_space, self.goal_size
-        return Box(space.names[:count], space.low[:count], space.high[:count], space.units[:count])
+        return self.instance_space.part(*self.instance_space.names[: self.goal_size])
 
     @property
     def layout(self) -> Layout:

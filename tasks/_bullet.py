@@ -26,6 +26,8 @@ GRAVITY = 9.81
 """m/s^2."""
 MAX_SLOTS = 28
 """For `Task.max_slots`: an idle world takes over 20 MB, and a cell should stay below 1 GB (ours)."""
+PLACE, ROTATION, VELOCITY, SPIN = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)
+"""Columns of `BulletSimulator.bodies`: position (m), quaternion, velocity (m/s), angular velocity (rad/s)."""
 PICTURE_SHAPE = (3 * PICTURE_PIXELS // 4, PICTURE_PIXELS)
 """Height and width of a picture in pixels."""
 
@@ -122,8 +124,8 @@ class BulletSimulator(DeployedSimulator):
         self.held: list[HeldTool | None] = [None] * num_slots
         self.tools: list[int | None] = [None] * num_slots
         """The bodies that hold the tools, these included."""
-        self.bodies: Floats = np.zeros((num_slots, num_bodies, 13))
-        """(B, N, 13): position (3), rotation (4), velocity (3), angular velocity (3) of the moving bodies."""
+        self.bodies: Floats = np.zeros((num_slots, num_bodies, SPIN.stop))
+        """(B, N, 13): `PLACE`, `ROTATION`, `VELOCITY` and `SPIN` of the moving bodies."""
         self.pose: Floats = np.zeros((num_slots, 3 + len(self.turning_axes)))
         """(B, A): pose of the held point."""
         self.carrier: Carrier = carrier or Gantry(self.turning_axes, self.push_force, self.turn_torque)
@@ -271,7 +273,7 @@ class BulletSimulator(DeployedSimulator):
             for body in self.moving[slot]:
                 for part in (*place(body, world), *motion(body, world)):
                     values.extend(part)
-        self.bodies[slots] = np.array(values).reshape(len(slots), -1, 13)
+        self.bodies[slots] = np.array(values).reshape(len(slots), -1, SPIN.stop)
         return self.bodies[slots]
 
     def perturb(self, slot: int, friction: float, mass: float) -> None:
@@ -308,8 +310,8 @@ class BulletSimulator(DeployedSimulator):
         low, high = np.array(self.room).T
         return Physics(
             overlap=max((-point[8] for point in points), default=0.0),
-            speed=float(np.linalg.norm(states[:, 7:10], axis=1).max(initial=0.0)),
-            contained=bool(((states[:, :3] >= low) & (states[:, :3] <= high)).all()),
+            speed=float(np.linalg.norm(states[:, VELOCITY], axis=1).max(initial=0.0)),
+            contained=bool(((states[:, PLACE] >= low) & (states[:, PLACE] <= high)).all()),
         )
 
     def tool_shapes(self, slot: int) -> tuple[BoxPart, ...]:

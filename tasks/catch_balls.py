@@ -16,7 +16,6 @@ from codesign_bench.task import (
     Floats,
     Quantity,
     Simulator,
-    Singles,
     Slots,
     Soundness,
     Task,
@@ -27,11 +26,14 @@ from ._planar import (
     CHAIN_GRAPH,
     COLOURS,
     LINK_HALF_WIDTH,
+    PLACE,
+    VELOCITY,
     Canvas,
     Clock,
     PlanarSimulator,
     View,
     chain_design_space,
+    chain_material,
     chain_parts,
     chain_points,
     chain_tool,
@@ -87,6 +89,40 @@ WALLS = (6.0, 34.0)
 
 CLOCK = Clock(steps=4, period=1.0 / 120.0)
 """Four physics steps per control step (ours), s: the fastest ball moves a quarter of its radius in a step."""
+
+
+INSTANCE = Box.of(
+    landing_x=(float(HAND_START[0]) - LANDING_DISTANCE[1], float(HAND_START[0]) + LANDING_DISTANCE[1], "m"),
+    **{f"ball_{k + 1}_offset": (-LANDING_SPREAD, LANDING_SPREAD, "m") for k in range(NUM_BALLS)},
+    **{f"ball_{k + 1}_height": (*START_HEIGHTS[k], "m") for k in range(NUM_BALLS)},
+    **{f"ball_{k + 1}_speed": (-THROW_SPEED, THROW_SPEED, "m/s") for k in range(NUM_BALLS)},
+)
+LANDING = INSTANCE.index("landing_x")
+OFFSETS, HEIGHTS, SPEEDS = (
+    INSTANCE.slice(*(f"ball_{k + 1}_{what}" for k in range(NUM_BALLS))) for what in ("offset", "height", "speed")
+)
+
+BALL = Box.of(
+    from_hand_x=(-25.0, 25.0, "m"),
+    from_hand_y=(-25.0, 25.0, "m"),
+    velocity_x=(-25.0, 25.0, "m/s"),
+    velocity_y=(-25.0, 25.0, "m/s"),
+    held=(0.0, 1.0, "1"),
+)
+"""What is observed of one ball."""
+STATE = Box.of(
+    hand_x=(float(HAND_START[0]) - 5.0, float(HAND_START[0]) + 5.0, "m"),
+    hand_velocity=(-MAX_SPEED, MAX_SPEED, "m/s"),
+    **{
+        f"ball_{k + 1}_{name}": (low, high, unit)
+        for k in range(NUM_BALLS)
+        for name, low, high, unit in zip(BALL.names, BALL.low, BALL.high, BALL.units, strict=True)
+    },
+)
+HAND, HAND_VELOCITY, BALLS = STATE.index("hand_x"), STATE.index("hand_velocity"), STATE.group("ball_")
+
+BALL_BODIES, TOOL_BODY = slice(0, NUM_BALLS), NUM_BALLS
+"""Rows of `PlanarSimulator.bodies`."""
 
 
 class CatchBalls(Task):
@@ -146,28 +182,9 @@ class CatchBalls(Task):
     )
     tool_graph = CHAIN_GRAPH
     control_space = Box.of(velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"))
-    instance_space = Box.of(
-        landing_x=(float(HAND_START[0]) - LANDING_DISTANCE[1], float(HAND_START[0]) + LANDING_DISTANCE[1], "m"),
-        **{f"ball_{k + 1}_offset": (-LANDING_SPREAD, LANDING_SPREAD, "m") for k in range(NUM_BALLS)},
-        **{f"ball_{k + 1}_height": (*START_HEIGHTS[k], "m") for k in range(NUM_BALLS)},
-        **{f"ball_{k + 1}_speed": (-THROW_SPEED, THROW_SPEED, "m/s") for k in range(NUM_BALLS)},
-    )
+    instance_space = INSTANCE
     goal_size = 1
-    state_space = Box.of(
-        hand_x=(float(HAND_START[0]) - 5.0, float(HAND_START[0]) + 5.0, "m"),
-        hand_velocity=(-MAX_SPEED, MAX_SPEED, "m/s"),
-        **{
-            f"ball_{k + 1}_{entry}": (low, high, unit)
-            for k in range(NUM_BALLS)
-            for entry, low, high, unit in (
-                ("from_hand_x", -25.0, 25.0, "m"),
-                ("from_hand_y", -25.0, 25.0, "m"),
-                ("velocity_x", -25.0, 25.0, "m/s"),
-                ("velocity_y", -25.0, 25.0, "m/s"),
-                ("held", 0.0, 1.0, "1"),
-            )
-        },
-    )
+    state_space = STATE
 
     outcome = Quantity("balls held", "balls")
     soundness = Soundness(
@@ -180,7 +197,7 @@ class CatchBalls(Task):
         """Return (count, I) random throws; the balls come down left or right of the hand, equally often."""
         instances = self.instance_space.sample(rng, count)
         distance = rng.uniform(*LANDING_DISTANCE, size=count)
-        instances[:, 0] = HAND_START[0] + distance * np.where(rng.random(count) < 0.5, -1.0, 1.0)
+        instances[:, LANDING] = HAND_START[0] + distance * np.where(rng.random(count) < 0.5, -1.0, 1.0)
         return instances
 
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
@@ -189,14 +206,13 @@ class CatchBalls(Task):
         Two patches, after the paper's of fetch cube (ours).
         """
         near, far = LANDING_DISTANCE
-        distance = np.abs(instances[:, 0] - HAND_START[0])
+        distance = np.abs(instances[:, LANDING] - HAND_START[0])
         result: Booleans = np.abs(distance - 0.5 * (near + far)) < 0.5 * fraction * (far - near)
         return result
 
     def material(self, designs: Floats) -> Floats:
         """Return the used share of the largest total link length for designs (b, D) in their units."""
-        total: Floats = designs[:, :3].sum(axis=1) / sum(self.design_space.high[:3])
-        return total
+        return chain_material(designs, self.design_space)
 
     def effort(self, controls: Floats) -> Floats:
         """Return the share of the largest speed of the hand for controls (b, C) in [-1, 1]."""
@@ -209,7 +225,9 @@ class CatchBalls(Task):
 
     def script(self) -> Behaviour:
         """Return a script that makes a pan on the side where the balls come down and brings its middle beneath them."""
-        return _Script(self)
+        from ._scripts.catch_balls import CatchBallsScript  # here, since that file reads this one
+
+        return CatchBallsScript(self)
 
     def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
         """Return a simulator of `num_slots` hands with three balls each."""
@@ -236,17 +254,15 @@ class _CatchSimulator(PlanarSimulator):
     def begin(self, slots: Slots, instances: Floats) -> None:
         """Put hands at their start and balls where the throws `instances` (b, I) begin."""
         starts, speeds = throws(instances)
-        self.landing[slots] = instances[:, 0]
+        self.landing[slots] = instances[:, LANDING]
         self.velocity[slots] = 0.0
         self.points[slots] = 0.0
         self.held[slots] = False
         self.held_steps[slots] = 0
         self.reward[slots] = self.outcome[slots] = 0.0
         self.success[slots] = self.failure[slots] = False
-        self.bodies[slots, :NUM_BALLS, :2] = starts
-        self.bodies[slots, :NUM_BALLS, 2] = speeds
-        self.bodies[slots, :NUM_BALLS, 3] = 0.0
-        self.bodies[slots, NUM_BALLS] = (*HAND_START, 0.0, 0.0)
+        self.bodies[slots, BALL_BODIES] = np.concatenate([starts, speeds], axis=2)
+        self.bodies[slots, TOOL_BODY] = (*HAND_START, 0.0, 0.0)
         self._write_state(slots)
 
     def build(self, slots: Slots, designs: Floats) -> None:
@@ -259,7 +275,7 @@ class _CatchSimulator(PlanarSimulator):
         space = pymunk.Space()
         space.gravity = (0.0, -GRAVITY)
         own_friction = BALL_FRICTION**0.5  # pymunk multiplies the two frictions of a contact.
-        for x, y, velocity_x, velocity_y in self.bodies[slot, :NUM_BALLS].tolist():
+        for x, y, velocity_x, velocity_y in self.bodies[slot, BALL_BODIES].tolist():
             ball = pymunk.Body(1.0, float("inf"))  # Balls slide and do not roll, so they come to rest on a tool.
             ball.position, ball.velocity = (x, y), (velocity_x, velocity_y)
             disc = pymunk.Circle(ball, BALL_RADIUS)
@@ -284,13 +300,14 @@ class _CatchSimulator(PlanarSimulator):
             assert tool is not None, "a tool is built before it is moved"
             tool.velocity = (speed, 0.0)
         self.advance(slots)
-        balls = self.read_bodies(slots)[:, :NUM_BALLS]
-        hand = self.bodies[slots, NUM_BALLS, :2]
-        points = self.points[slots]
-        held = is_held(points, balls[:, :, :2] - hand[:, None], balls[:, :, 2:] - self.bodies[slots, NUM_BALLS:, 2:])
+        bodies, points = self.read_bodies(slots), self.points[slots]
+        balls, hand = bodies[:, BALL_BODIES], bodies[:, TOOL_BODY]
+        from_hand = balls - hand[:, None]
+        held = is_held(points, from_hand[..., PLACE], from_hand[..., VELOCITY])
         steps = np.where(held, self.held_steps[slots] + 1, 0)
         caught = steps >= HOLD_STEPS
-        lost = balls[:, :, 1] < (hand[:, 1] + points[:, :, 1].min(axis=1))[:, None]
+        lowest = hand[:, 1] + points[:, :, 1].min(axis=1)
+        lost = balls[:, :, 1] < lowest[:, None]
         success = caught.all(axis=1)
         gained = held.sum(axis=1) - self.held[slots].sum(axis=1)
         self.reward[slots] = gained / NUM_BALLS + TABLE.slack_reward + SUCCESS_REWARD * success
@@ -307,59 +324,23 @@ class _CatchSimulator(PlanarSimulator):
         canvas.circle((self.landing[slot], y), 0.3, COLOURS["goal"])
 
     def _write_state(self, slots: Slots) -> None:
-        hand = self.bodies[slots, NUM_BALLS]
-        balls = self.bodies[slots, :NUM_BALLS]
-        balls[:, :, :2] -= hand[:, None, :2]
-        self.state[slots, 0] = hand[:, 0]
-        self.state[slots, 1] = self.velocity[slots]
-        seen = np.concatenate([balls, self.held[slots][:, :, None]], axis=2)
-        self.state[slots, 2:] = seen.reshape(len(slots), -1)
-
-
-class _Script(Behaviour):
-    """Brings the middle of whatever tool it is given beneath the balls that are still in the air."""
-
-    PAN = (-1.0, 1.0, 1.0, 1.0, 1.0)
-    """Normalised: a short stem, then two long links that make a pan on the right; on the left with other angles."""
-    GAIN = 4.0
-    """Hand's speed per distance, 1/s."""
-
-    def __init__(self, task: CatchBalls) -> None:
-        self.task = task
-
-    def design(self, observation: Singles) -> Singles:
-        """Return a pan on the side where the balls come down."""
-        right = observation[..., self.task.layout.goal] > HAND_START[0]
-        pan = np.array(self.PAN, dtype=np.float32)
-        mirror = np.array([1.0, 1.0, 1.0, -1.0, -1.0], dtype=np.float32)
-        tools: Singles = np.where(right, pan, pan * mirror)
-        return tools
-
-    def act(self, observation: Singles) -> Singles:
-        """Return the hand's velocity, normalised."""
-        seen = np.atleast_2d(observation).astype(np.float64)
-        balls = seen[:, 2 : 2 + 5 * NUM_BALLS].reshape(len(seen), NUM_BALLS, 5)
-        x, y, velocity_x, velocity_y, held = np.moveaxis(balls, 2, 0)
-        in_the_air = (y > 1.0) & (held < 0.5)
-        fall = (velocity_y + np.sqrt(velocity_y**2 + 2.0 * GRAVITY * np.maximum(y, 0.0))) / GRAVITY
-        points = chain_points(self.task.design_space.from_unit(seen[:, self.task.layout.design]), FIRST_LINK_ANGLE)
-        middle = 0.5 * (points[:, :, 0].min(axis=1) + points[:, :, 0].max(axis=1))
-        count = in_the_air.sum(axis=1)
-        way = ((x + velocity_x * fall) * in_the_air).sum(axis=1) / np.maximum(count, 1) - middle
-        control = np.where(count > 0, self.GAIN / MAX_SPEED * way, 0.0)[:, None]
-        result: Singles = np.clip(control, -1.0, 1.0).astype(np.float32)
-        return result if observation.ndim == 2 else result[0]
+        hand, balls = self.bodies[slots, TOOL_BODY, PLACE], self.bodies[slots, BALL_BODIES]
+        self.state[slots, HAND] = hand[:, 0]
+        self.state[slots, HAND_VELOCITY] = self.velocity[slots]
+        from_hand = balls[..., PLACE] - hand[:, None]
+        seen = np.concatenate([from_hand, balls[..., VELOCITY], self.held[slots][:, :, None]], axis=2)  # as in BALL
+        self.state[slots, BALLS] = seen.reshape(len(slots), -1)
 
 
 def throws(instances: Floats) -> tuple[Floats, Floats]:
-    """Return where the balls of `instances` (b, I) start, (b, K, 2), m, and their speeds along x (b, K), m/s.
+    """Return where the balls of `instances` (b, I) start and how fast, (b, K, 2), m and m/s; they start level.
 
     A ball starts so far from its landing place as it flies until it is as high as the hand.
     """
-    offset, height, speed = np.split(instances[:, 1:], 3, axis=1)
+    offset, height, speed = instances[:, OFFSETS], instances[:, HEIGHTS], instances[:, SPEEDS]
     fall = np.sqrt(2.0 / GRAVITY * (height - HAND_START[1]))
-    start = instances[:, :1] + offset - speed * fall
-    return np.stack([start, height], axis=2), speed
+    start = instances[:, LANDING, None] + offset - speed * fall
+    return np.stack([start, height], axis=2), np.stack([speed, np.zeros_like(speed)], axis=2)
 
 
 def is_held(points: Floats, balls: Floats, velocity: Floats) -> Booleans:

@@ -17,7 +17,6 @@ from codesign_bench.task import (
     Floats,
     Quantity,
     Simulator,
-    Singles,
     Slots,
     Soundness,
     Task,
@@ -26,10 +25,21 @@ from codesign_bench.task import (
 )
 from codesign_bench.task.robot import DeployedSimulator, RobotTrials
 
-from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, box_parts, rotations_about
+from ._bullet import (
+    MAX_SLOTS,
+    PLACE,
+    ROTATION,
+    VELOCITY,
+    Boxes,
+    BulletSimulator,
+    Camera,
+    Marks,
+    box_parts,
+    rotations_about,
+)
 from ._carriers import Carrier
 from ._deployed import arm_carrier, gripper_handle
-from ._scene import COLOURS, Clock
+from ._scene import COLOURS, Clock, nearest_clear_shift
 
 TABLE = BOX_SCENES["fetch_cube"]
 
@@ -100,12 +110,51 @@ ARM_CAMERA = Camera(eye=(0.0, 1.75, 1.0), target=(0.0, 0.38, 0.16))
 """Sees arm and cube in deployment: from behind the overhang."""
 
 
-def _design_space() -> Box:
-    entries = {}
-    for link in range(1, NUM_LINKS + 1):
-        for what, (low, high) in zip(("width", "length", "height"), SIZES, strict=True):
-            entries[f"link_{link}_{what}"] = (low, high, "m")
-    return Box.of(**entries, joint_1_angle=(ANGLES[0], ANGLES[1], "rad"), joint_2_angle=(ANGLES[0], ANGLES[1], "rad"))
+SIZE_NAMES = ("width", "length", "height")
+DESIGN = Box.of(
+    **{
+        f"link_{link + 1}_{what}": (low, high, "m")
+        for link in range(NUM_LINKS)
+        for what, (low, high) in zip(SIZE_NAMES, SIZES, strict=True)
+    },
+    joint_1_angle=(ANGLES[0], ANGLES[1], "rad"),
+    joint_2_angle=(ANGLES[0], ANGLES[1], "rad"),
+)
+LINK_SIZES, JOINT_ANGLES = DESIGN.group("link_"), DESIGN.group("joint_")
+
+CONTROL = Box.of(
+    move_x=(-STEP_LENGTH, STEP_LENGTH, "m"),
+    move_y=(-STEP_LENGTH, STEP_LENGTH, "m"),
+    move_z=(-STEP_LENGTH, STEP_LENGTH, "m"),
+)
+IN_PLANE = CONTROL.slice("move_x", "move_y")
+
+INSTANCE = Box.of(cube_start_x=(*CUBE_X, "m"), cube_start_y=(*CUBE_Y, "m"))
+START_X, START_Y = INSTANCE.index("cube_start_x"), INSTANCE.index("cube_start_y")
+
+CHAIN_NAMES = ("hold", "joint_1", "joint_2", "tip")
+"""Points of the chain, from the held point on."""
+TO_CUBE_NAMES = tuple(f"{point}_to_cube_{axis}" for point in CHAIN_NAMES for axis in "xy")
+STATE = Box.of(
+    cube_x=(-1.5, 1.5, "m"),
+    cube_y=(-1.0, 2.0, "m"),
+    cube_velocity_x=(-2.0, 2.0, "m/s"),
+    cube_velocity_y=(-2.0, 2.0, "m/s"),
+    cube_turn_cos=(-1.0, 1.0, "1"),
+    cube_turn_sin=(-1.0, 1.0, "1"),
+    cube_distance=(0.0, 2.5, "m"),
+    hold_x=(-0.45, 0.45, "m"),
+    hold_y=(0.25, 0.55, "m"),
+    hold_z=(0.0, 0.05, "m"),
+    **dict.fromkeys(TO_CUBE_NAMES, (-2.0, 2.0, "m")),
+)
+CUBE, CUBE_VELOCITY = STATE.slice("cube_x", "cube_y"), STATE.slice("cube_velocity_x", "cube_velocity_y")
+TURN_COS, TURN_SIN = STATE.index("cube_turn_cos"), STATE.index("cube_turn_sin")
+CUBE_DISTANCE, TO_CUBE = STATE.index("cube_distance"), STATE.slice(*TO_CUBE_NAMES)
+HOLD, HOLD_IN_PLANE = STATE.slice("hold_x", "hold_y", "hold_z"), STATE.slice("hold_x", "hold_y")
+
+XY = slice(0, 2)
+"""The horizontal part of a place, m, or of a velocity, m/s."""
 
 
 class FetchCube(Task):
@@ -162,37 +211,14 @@ class FetchCube(Task):
     title = "Fetch cube"
     horizon = TABLE.max_episode_steps
     control_period = CLOCK.control_period
-    design_space = _design_space()
+    design_space = DESIGN
     tool_graph = ToolGraph(
         num_nodes=NUM_LINKS, edges=((0, 1), (1, 2)), parameter_nodes=(0, 0, 0, 1, 1, 1, 2, 2, 2, 1, 2)
     )
-    control_space = Box.of(
-        move_x=(-STEP_LENGTH, STEP_LENGTH, "m"),
-        move_y=(-STEP_LENGTH, STEP_LENGTH, "m"),
-        move_z=(-STEP_LENGTH, STEP_LENGTH, "m"),
-    )
-    instance_space = Box.of(cube_start_x=(*CUBE_X, "m"), cube_start_y=(*CUBE_Y, "m"))
+    control_space = CONTROL
+    instance_space = INSTANCE
     goal_size = 2
-    state_space = Box.of(
-        cube_x=(-1.5, 1.5, "m"),
-        cube_y=(-1.0, 2.0, "m"),
-        cube_velocity_x=(-2.0, 2.0, "m/s"),
-        cube_velocity_y=(-2.0, 2.0, "m/s"),
-        cube_turn_cos=(-1.0, 1.0, "1"),
-        cube_turn_sin=(-1.0, 1.0, "1"),
-        cube_distance=(0.0, 2.5, "m"),
-        hold_x=(-0.45, 0.45, "m"),
-        hold_y=(0.25, 0.55, "m"),
-        hold_z=(0.0, 0.05, "m"),
-        hold_to_cube_x=(-2.0, 2.0, "m"),
-        hold_to_cube_y=(-2.0, 2.0, "m"),
-        joint_1_to_cube_x=(-2.0, 2.0, "m"),
-        joint_1_to_cube_y=(-2.0, 2.0, "m"),
-        joint_2_to_cube_x=(-2.0, 2.0, "m"),
-        joint_2_to_cube_y=(-2.0, 2.0, "m"),
-        tip_to_cube_x=(-2.0, 2.0, "m"),
-        tip_to_cube_y=(-2.0, 2.0, "m"),
-    )
+    state_space = STATE
 
     outcome = Quantity("distance from cube to base", "m")
     max_slots = MAX_SLOTS
@@ -206,8 +232,8 @@ class FetchCube(Task):
         """
         half = 0.5 * np.sqrt(fraction)
         width, depth = CUBE_X[1], CUBE_Y[1] - CUBE_Y[0]
-        across = np.abs(np.abs(instances[:, 0]) - 0.5 * width) / width
-        along = np.abs(instances[:, 1] - 0.5 * sum(CUBE_Y)) / depth
+        across = np.abs(np.abs(instances[:, START_X]) - 0.5 * width) / width
+        along = np.abs(instances[:, START_Y] - 0.5 * sum(CUBE_Y)) / depth
         result: Booleans = (across < half) & (along < half)
         return result
 
@@ -218,7 +244,7 @@ class FetchCube(Task):
 
     def material(self, designs: Floats) -> Floats:
         """Return the used share of the largest total volume of the links for designs (b, D) in their units."""
-        sizes = designs[:, : 3 * NUM_LINKS].reshape(-1, NUM_LINKS, 3)
+        sizes = designs[:, LINK_SIZES].reshape(-1, NUM_LINKS, len(SIZE_NAMES))
         largest = NUM_LINKS * np.prod([high for _, high in SIZES])
         volume: Floats = sizes.prod(axis=2).sum(axis=1) / largest
         return volume
@@ -238,7 +264,9 @@ class FetchCube(Task):
 
     def script(self) -> Behaviour:
         """Return a script that pulls the cube with whichever side of a link it can bring behind it."""
-        return _Script(self)
+        from ._scripts.fetch_cube import FetchCubeScript  # here, since that file reads this one
+
+        return FetchCubeScript(self)
 
     def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
         """Return a simulator of `num_slots` cubes and tools."""
@@ -320,7 +348,7 @@ class _FetchCubeSimulator(BulletSimulator):
         points, boxes = chain_boxes(designs)
         floor = boxes.half_extents[:, :, 2].max(axis=1) + GROUND_CLEARANCE
         poses = np.tile(HOLD_START, (len(slots), 1))
-        poses[:, 0] += start_shift(boxes, HOLD_START[:2] - self.start[slots])
+        poses[:, 0] += start_shift(boxes, HOLD_START[XY] - self.start[slots])
         poses[:, 2] = np.maximum(poses[:, 2], floor)
         self.low[slots, 2] = floor
         self.points[slots] = points
@@ -330,9 +358,9 @@ class _FetchCubeSimulator(BulletSimulator):
     def step(self, slots: Slots, controls: Floats) -> None:
         """Move the held points by `controls` (b, C) in one control step and reward the cubes' way to the base."""
         pose = self.pose[slots]
-        plane = np.maximum(1.0, np.sqrt((controls[:, :2] ** 2).sum(axis=1)))
+        length = np.maximum(1.0, np.sqrt((controls[:, IN_PLANE] ** 2).sum(axis=1)))
         move = STEP_LENGTH * controls
-        move[:, :2] /= plane[:, None]
+        move[:, IN_PLANE] /= length[:, None]
         self.drive(slots, np.clip(pose + move, self.low[slots], self.high) - pose)
         self.advance(slots)
         self.read_tools(slots)
@@ -358,161 +386,25 @@ class _FetchCubeSimulator(BulletSimulator):
 
     def _write_state(self, slots: Slots) -> None:
         cube, pose = self.bodies[slots, 0], self.pose[slots]
-        x, y, z, w = cube[:, 3:7].T
+        place, velocity = cube[:, PLACE][:, XY], cube[:, VELOCITY][:, XY]
+        x, y, z, w = cube[:, ROTATION].T
+        # A cube looks the same after a quarter turn, and so does four times its angle about the vertical.
         turn = 4.0 * np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        distance = np.sqrt((cube[:, :2] ** 2).sum(axis=1))
+        distance = np.sqrt((place**2).sum(axis=1))
         state = self.state
-        state[slots, 0:2] = cube[:, :2]
-        state[slots, 2:4] = cube[:, 7:9]
-        state[slots, 4] = np.cos(turn)
-        state[slots, 5] = np.sin(turn)
-        state[slots, 6] = distance
-        state[slots, 7:10] = pose
-        to_cube = (cube[:, :2] - pose[:, :2])[:, None] - self.points[slots]
-        state[slots, 10:] = to_cube.reshape(len(slots), -1)
+        state[slots, CUBE] = place
+        state[slots, CUBE_VELOCITY] = velocity
+        state[slots, TURN_COS] = np.cos(turn)
+        state[slots, TURN_SIN] = np.sin(turn)
+        state[slots, CUBE_DISTANCE] = distance
+        state[slots, HOLD] = pose
+        to_cube = (place - pose[:, XY])[:, None] - self.points[slots]
+        state[slots, TO_CUBE] = to_cube.reshape(len(slots), -1)
         self.distance[slots] = self.outcome[slots] = distance
 
 
-class _Script(Behaviour):
-    """Brings a side of a link behind the cube as seen from the base, then pulls towards the base.
-
-    Every link has a few places on both of its sides. The one is taken that lets the cube go furthest before the held
-    point leaves its box, is near, and can be reached around the cube: straight, first sideways or first along y. The
-    choice is made anew in every step, so that a place further down the link follows when a pull has come to its end.
-    """
-
-    LINK = (0.02, 0.03)
-    """Width and height of every link of its tools, m."""
-    HOOK, BENT, BAR = (0.0, -90.0), (-45.0, -45.0), (-65.0, 0.0)
-    """Angles of its tools, degrees: for cubes in the middle, at the side, and far away. Left ones get mirror images."""
-    HOOK_BEHIND = 0.045
-    """The hook starts so far behind the cube's centre if the links are long enough for that, m."""
-    FAR, ASIDE = 0.7, 0.22
-    """Cubes at larger y are far ones, cubes at larger abs(x) lie at the side, m."""
-
-    PLACES_PER_LINK = 4
-    CONSIDERED = 8
-    """For so many places the ways there are looked at."""
-    WAY_POINTS = 8
-    GAP = 0.004
-    """Between link and cube until a pull begins, m."""
-    DISC = 0.027
-    """On its way a link keeps this far from the cube's centre, m."""
-    FACING = 0.75
-    """Smallest cosine between a link's side and the pull, within the friction's cone."""
-    DETOURS = (0.0, 0.05, 0.05, 0.1)
-    """What the paths cost: straight, first sideways, first along y, first back."""
-    INSIDE = 0.03
-    """The cube is pulled this far beyond the goal's edge, m."""
-
-    def __init__(self, task: FetchCube) -> None:
-        self.task = task
-
-    def design(self, observation: Singles) -> Singles:
-        """Return a hook, a bent chain or a bar by the cube's place."""
-        cube = np.atleast_2d(observation)[:, :2].astype(np.float64)
-        far, aside = cube[:, 1] > self.FAR, np.abs(cube[:, 0]) > self.ASIDE
-        shape = np.where(far, 2, np.where(aside, 1, 0))
-        reach = 0.5 * (cube[:, 1] + self.HOOK_BEHIND - HOLD_START[1])
-        short, long = SIZES[1]
-        lengths = np.full((len(cube), NUM_LINKS), long)
-        lengths[:, 0] = np.where(far, long, np.where(aside, short, np.clip(reach, short, long)))
-        lengths[:, 1] = np.where(far, long, lengths[:, 0])
-        designs = np.zeros((len(cube), self.task.design_space.size))
-        for link in range(NUM_LINKS):
-            designs[:, 3 * link : 3 * link + 3] = np.pad(lengths[:, link, None], ((0, 0), (1, 1)))
-            designs[:, [3 * link, 3 * link + 2]] = self.LINK
-        angles = np.deg2rad([self.HOOK, self.BENT, self.BAR])[shape]
-        designs[:, 3 * NUM_LINKS :] = np.where(cube[:, :1] < 0.0, -angles, angles)
-        result: Singles = self.task.design_space.to_unit(designs).astype(np.float32)
-        return result if observation.ndim == 2 else result[0]
-
-    def act(self, observation: Singles) -> Singles:
-        """Return the held point's move, normalised."""
-        seen = np.atleast_2d(observation).astype(np.float64)
-        cube, hold = seen[:, 0:2], seen[:, 7:9]
-        pull = -cube / np.linalg.norm(cube, axis=1, keepdims=True)
-        _, boxes = chain_boxes(self.task.design_space.from_unit(seen[:, self.task.layout.design]))
-        ways, score = self._ways(cube, hold, pull, 0.25 * np.arctan2(seen[:, 5], seen[:, 4]), boxes)
-        paths = _paths(ways, HOLD_Y[0] - hold[:, 1], self.WAY_POINTS)
-        blocked = np.clip(
-            1.0 - _gaps(cube[:, None, None, None] - hold[:, None, None, None] - paths, boxes) / self.DISC, 0, 1
-        )
-        total = (score[:, :, None] - blocked.max(axis=3) - self.DETOURS).reshape(len(seen), -1)
-        choice, rows = total.argmax(axis=1), np.arange(len(seen))
-        way, kind = ways[rows, choice // len(self.DETOURS)], choice % len(self.DETOURS)
-        leg = way.copy()
-        leg[(kind == 1) & (np.abs(way[:, 0]) > self.GAP), 1] = 0.0
-        leg[(kind == 2) & (np.abs(way[:, 1]) > self.GAP), 0] = 0.0
-        leg[kind == 3] = (0.0, -1.0)
-        there = np.linalg.norm(way, axis=1, keepdims=True) < 3.0 * self.GAP
-        move = np.where(there, 0.5 * way / STEP_LENGTH + pull, leg / STEP_LENGTH)
-        controls = np.zeros((len(seen), 3), dtype=np.float32)
-        controls[:, :2] = move / np.maximum(1.0, np.linalg.norm(move, axis=1, keepdims=True))
-        return controls if observation.ndim == 2 else controls[0]
-
-    def _ways(self, cube: Floats, hold: Floats, pull: Floats, turn: Floats, boxes: Boxes) -> tuple[Floats, Floats]:
-        """Return the held point's ways (B, P, 2) to the best places for a pull, and how good these are, (B, P)."""
-        places, sides = self._places(turn, boxes)
-        held = cube[:, None] - places
-        low, high = np.array([HOLD_X[0], HOLD_Y[0]]), np.array([HOLD_X[1], HOLD_Y[1]])
-        with np.errstate(divide="ignore"):
-            room = np.where(pull[:, None] > 0.0, high - held, low - held) / pull[:, None]
-        needed = np.linalg.norm(cube, axis=1, keepdims=True) - GOAL_DISTANCE + self.INSIDE
-        facing = (sides * pull[:, None]).sum(axis=2)
-        gain = np.clip(np.minimum(room.min(axis=2), needed), 0.0, None) * facing * (facing > self.FACING)
-        ways = held - hold[:, None]
-        missed = np.linalg.norm(np.clip(held, low, high) - held, axis=2)
-        score = 10.0 * gain - np.linalg.norm(ways, axis=2) - 20.0 * missed
-        best = np.argsort(-score, axis=1)[:, : self.CONSIDERED]
-        return np.take_along_axis(ways, best[..., None], axis=1), np.take_along_axis(score, best, axis=1)
-
-    def _places(self, turn: Floats, boxes: Boxes) -> tuple[Floats, Floats]:
-        """Return where the cube's centre may lie beside links, from the held point, and the links' sides (B, P, 2)."""
-        heading = _turns(boxes)
-        normal = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-        along = np.stack([-normal[..., 1], normal[..., 0]], axis=-1)
-        share = (2.0 * np.arange(self.PLACES_PER_LINK) + 1.0) / self.PLACES_PER_LINK - 1.0
-        middle = boxes.centres[:, :, None, :2] + (boxes.half_extents[..., 1:2] * share)[..., None] * along[:, :, None]
-        skew = heading - turn[:, None]
-        reach = boxes.half_extents[..., 0] + 0.5 * CUBE_SIZE * (np.abs(np.cos(skew)) + np.abs(np.sin(skew))) + self.GAP
-        away = (normal * reach[..., None])[:, :, None]
-        shape = (len(turn), -1, 2)
-        sides = np.repeat(normal, self.PLACES_PER_LINK, axis=1)
-        places = np.concatenate([(middle + away).reshape(shape), (middle - away).reshape(shape)], axis=1)
-        return places, np.concatenate([sides, -sides], axis=1)
-
-
-def _paths(ways: Floats, back: Floats, count: int) -> Floats:
-    """Return (B, P, 4, count, 2) points on four paths along each of `ways` (B, P, 2), after `count` equal times.
-
-    They lead straight there, first along x, first along y, and first `back` (B,) along y, then along x.
-    """
-    share = (np.arange(count) + 1.0) / count
-    early, late = np.clip(2.0 * share, 0.0, 1.0), np.clip(2.0 * share - 1.0, 0.0, 1.0)
-    shares = np.stack([[share, share], [early, late], [late, early], [np.clip(1.5 * share - 0.25, 0.0, 1.0), late]])
-    paths: Floats = ways[:, :, None, None] * shares.transpose(0, 2, 1)
-    paths[:, :, 3, :, 1] += back[:, None, None] * np.minimum(4.0 * share, np.minimum(1.0, 2.0 - 2.0 * share))
-    return paths
-
-
-def _gaps(points: Floats, boxes: Boxes) -> Floats:
-    """Return how far `points` (B, ..., 2), seen from the held point, are from the nearest link, m; negative inside."""
-    heading, nearest = _turns(boxes), np.full(points.shape[:-1], np.inf)
-    widen = (slice(None),) + (None,) * (points.ndim - 2)
-    for link in range(NUM_LINKS):
-        offset = points - boxes.centres[:, link, :2][widen]
-        cos, sin = np.cos(heading[:, link])[widen], np.sin(heading[:, link])[widen]
-        half = boxes.half_extents[:, link]
-        across = np.abs(cos * offset[..., 0] + sin * offset[..., 1]) - half[:, 0][widen]
-        along = np.abs(cos * offset[..., 1] - sin * offset[..., 0]) - half[:, 1][widen]
-        outside = np.hypot(np.maximum(across, 0.0), np.maximum(along, 0.0))
-        nearest = np.minimum(nearest, outside + np.minimum(np.maximum(across, along), 0.0))
-    return nearest
-
-
-def _turns(boxes: Boxes) -> Floats:
-    """Return how far each link is turned from the y axis, rad, (b, K)."""
+def link_turns(boxes: Boxes) -> Floats:
+    """Return how far each link is turned from the y axis, rad, (b, K); links turn about the vertical alone."""
     return 2.0 * np.arctan2(boxes.rotations[..., 2], boxes.rotations[..., 3])
 
 
@@ -521,9 +413,10 @@ def chain_boxes(designs: Floats) -> tuple[Floats, Boxes]:
 
     The first link points away from the robot, along y; each joint turns the rest of the chain about the vertical.
     """
-    sizes = designs[:, : 3 * NUM_LINKS].reshape(-1, NUM_LINKS, 3)
-    turns = np.cumsum(np.pad(designs[:, 3 * NUM_LINKS :], ((0, 0), (1, 0))), axis=1)
-    steps = sizes[:, :, 1, None] * np.stack([-np.sin(turns), np.cos(turns)], axis=-1)
+    sizes = designs[:, LINK_SIZES].reshape(-1, NUM_LINKS, len(SIZE_NAMES))
+    turns = np.cumsum(np.pad(designs[:, JOINT_ANGLES], ((0, 0), (1, 0))), axis=1)
+    lengths = sizes[:, :, SIZE_NAMES.index("length"), None]
+    steps = lengths * np.stack([-np.sin(turns), np.cos(turns)], axis=-1)
     points = np.zeros((len(designs), NUM_LINKS + 1, 2))
     np.cumsum(steps, axis=1, out=points[:, 1:])
     centres = np.pad(0.5 * (points[:, :-1] + points[:, 1:]), ((0, 0), (0, 0), (0, 1)))
@@ -533,48 +426,52 @@ def chain_boxes(designs: Floats) -> tuple[Floats, Boxes]:
 def start_shift(boxes: Boxes, offset: Floats) -> Floats:
     """Return how far (b,) tools must start from `HOLD_START` along x to be clear of their cubes, in m.
 
-    `offset` (b, 2) leads from a cube's centre to the held point. Along x, a link is too close over one interval; the
-    tool starts at the place nearest to no shift that lies in no link's interval and inside the held point's box.
+    `offset` (b, 2) leads from a cube's centre to the held point, m. Along x, a link is too close over one interval; the
+    held point stays inside its box.
     """
-    low, high = _blocked_shifts(boxes, offset)
-    candidates = np.concatenate([np.zeros((len(low), 1)), low, high], axis=1)
-    inside = (candidates[:, :, None] > low[:, None] + 1e-9) & (candidates[:, :, None] < high[:, None] - 1e-9)
-    outside = np.abs(candidates + HOLD_START[0]) > HOLD_X[1]
-    distance = np.where(inside.any(axis=2) | outside | np.isnan(candidates), np.inf, np.abs(candidates))
-    result: Floats = candidates[np.arange(len(low)), distance.argmin(axis=1)]
-    return result
+    return nearest_clear_shift(*_blocked_shifts(boxes, offset), (HOLD_X[0] - HOLD_START[0], HOLD_X[1] - HOLD_START[0]))
 
 
 def _blocked_shifts(boxes: Boxes, offset: Floats) -> tuple[Floats, Floats]:
     """Return the ends (b, K) of each link's interval of shifts at which it is too close to the cube; NaN if none.
 
-    Seen from above, link and cube are rectangles. They are apart when their shadows on one of the four directions of
-    their sides are; on each direction the shadows are too close over one interval, and the link is over what is common
-    to all four.
+    Seen from above, link and cube are rectangles. Two rectangles are apart if and only if their shadows on one of the
+    four directions of their sides are (separating axes). Shadows on a direction are too close over one interval of
+    shifts, so the link is too close over what the four intervals have in common.
     """
-    half = 0.5 * CUBE_SIZE
-    turn = _turns(boxes)
+    turn = link_turns(boxes)
     across = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     along = np.stack([-np.sin(turn), np.cos(turn)], axis=-1)
-    centre = boxes.centres[..., :2] + offset[:, None]
-    lows, highs = [], []
-    for direction in (
-        np.broadcast_to([1.0, 0.0], across.shape),
-        np.broadcast_to([0.0, 1.0], across.shape),
-        across,
-        along,
-    ):
-        reach = START_CLEARANCE + half * np.abs(direction).sum(axis=-1)
-        for side, axis in ((0, across), (1, along)):
-            reach = reach + boxes.half_extents[..., side] * np.abs((direction * axis).sum(axis=-1))
-        middle = (direction * centre).sum(axis=-1)
-        slope = direction[..., 0]
-        tilted = np.abs(slope) > 1e-9
-        divisor = np.where(tilted, slope, 1.0)
-        ends = np.stack([(-reach - middle) / divisor, (reach - middle) / divisor])
-        always = np.where(np.abs(middle) < reach, np.inf, np.nan)
-        lows.append(np.where(tilted, ends.min(axis=0), -always))
-        highs.append(np.where(tilted, ends.max(axis=0), always))
-    low, high = np.maximum.reduce(lows), np.minimum.reduce(highs)
+    centre = boxes.centres[..., XY] + offset[:, None]
+    x, y = (np.broadcast_to(axis, across.shape) for axis in ([1.0, 0.0], [0.0, 1.0]))
+    ends = [_close_shadows(direction, (across, along), boxes, centre) for direction in (x, y, across, along)]
+    low, high = np.maximum.reduce([low for low, _ in ends]), np.minimum.reduce([high for _, high in ends])
     apart = ~(low < high)
     return np.where(apart, np.nan, low), np.where(apart, np.nan, high)
+
+
+def _close_shadows(
+    direction: Floats, sides: tuple[Floats, Floats], boxes: Boxes, centre: Floats
+) -> tuple[Floats, Floats]:
+    """Return the ends (b, K) of the interval of shifts at which the shadows of link and cube are too close.
+
+    Args:
+        direction: unit vectors (b, K, 2) on which the shadows fall.
+        sides: unit vectors (b, K, 2) across and along the links.
+        boxes: of the tools.
+        centre: of the links, seen from the cube's centre (b, K, 2), m.
+    """
+    # Half the length of the cube's shadow and of the link's, and what must be free between the two.
+    reach = START_CLEARANCE + 0.5 * CUBE_SIZE * np.abs(direction).sum(axis=-1)
+    for axis, side in enumerate(sides):
+        reach = reach + boxes.half_extents[..., axis] * np.abs((direction * side).sum(axis=-1))
+    middle = (direction * centre).sum(axis=-1)
+    # A shift s along x moves the link's shadow by slope * s.
+    slope = direction[..., 0]
+    tilted = np.abs(slope) > 1e-9
+    divisor = np.where(tilted, slope, 1.0)
+    ends = np.stack([(-reach - middle) / divisor, (reach - middle) / divisor])
+    # On a direction square to x it moves nothing: the shadows are too close at every shift, or at none (NaN, which the
+    # caller's maximum and minimum pass on).
+    always = np.where(np.abs(middle) < reach, np.inf, np.nan)
+    return np.where(tilted, ends.min(axis=0), -always), np.where(tilted, ends.max(axis=0), always)

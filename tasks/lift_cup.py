@@ -6,20 +6,16 @@ Shapes: `B` slots, `b` slots a call names, `I` = 2 instance (cup's width and hei
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 
 from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 from codesign_bench.studies.corl2023.scenes import BOX_SCENES
 from codesign_bench.task import (
     Behaviour,
-    Booleans,
     Box,
     Floats,
     Quantity,
     Simulator,
-    Singles,
     Slots,
     Soundness,
     Task,
@@ -28,7 +24,19 @@ from codesign_bench.task import (
 )
 from codesign_bench.task.robot import DeployedSimulator, RobotTrials
 
-from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, box_parts, rotation_matrices, rotations_about
+from ._bullet import (
+    MAX_SLOTS,
+    PLACE,
+    ROTATION,
+    VELOCITY,
+    Boxes,
+    BulletSimulator,
+    Camera,
+    Marks,
+    box_parts,
+    rotation_matrices,
+    rotations_about,
+)
 from ._carriers import Carrier
 from ._deployed import arm_carrier, gripper_handle
 from ._scene import COLOURS, Clock
@@ -106,6 +114,45 @@ FORK_GRAPH = ToolGraph(num_nodes=4, edges=((0, 1), (1, 2), (1, 3)), parameter_no
 """Handle, cross bar, left and right prong; the right prong is the left one's mirror image and has no own parameters."""
 
 
+DESIGN = Box.of(
+    prong_distance=(2.0 * TABLE.box_dimensions_min[1], 2.0 * TABLE.box_dimensions_max[1], "m"),
+    prong_tilt=(float(np.deg2rad(TABLE.tool_angle_min[0])), float(np.deg2rad(TABLE.tool_angle_max[0])), "rad"),
+    prong_width=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
+    prong_length=(2.0 * TABLE.box_dimensions_min[1], 2.0 * TABLE.box_dimensions_max[1], "m"),
+    prong_height=(2.0 * TABLE.box_dimensions_min[2], 2.0 * TABLE.box_dimensions_max[2], "m"),
+)
+
+INSTANCE = Box.of(cup_width_scale=(0.3, 0.9, "0.18 m"), cup_height_scale=(0.6, 0.9, "0.18 m"))
+CUP_WIDTH = INSTANCE.index("cup_width_scale")
+STATE = Box.of(
+    held_x=(WORKSPACE.low[0], WORKSPACE.high[0], "m"),
+    held_y=(WORKSPACE.low[1], WORKSPACE.high[1], "m"),
+    held_z=(WORKSPACE.low[2], WORKSPACE.high[2], "m"),
+    cup_way_x=(-1.0, 1.0, "m"),
+    cup_way_y=(-1.0, 1.0, "m"),
+    cup_way_z=(-1.0, 1.0, "m"),
+    prongs_to_cup_x=(-1.0, 1.0, "m"),
+    prongs_to_cup_y=(-1.0, 1.0, "m"),
+    prongs_to_cup_z=(-1.0, 1.0, "m"),
+    prongs_to_rim_z=(-1.0, 1.0, "m"),
+    left_clearance=(-1.0, 1.0, "m"),
+    right_clearance=(-1.0, 1.0, "m"),
+    cup_x_axis_z=(-1.0, 1.0, "-"),
+    cup_y_axis_z=(-1.0, 1.0, "-"),
+    cup_z_axis_z=(-1.0, 1.0, "-"),
+    cup_y_axis_x=(-1.0, 1.0, "-"),
+    cup_velocity_x=(-5.0, 5.0, "m/s"),
+    cup_velocity_y=(-5.0, 5.0, "m/s"),
+    cup_velocity_z=(-5.0, 5.0, "m/s"),
+)
+HELD, CUP_WAY, CUP_VELOCITY = STATE.group("held_"), STATE.group("cup_way_"), STATE.group("cup_velocity_")
+CUP_HEIGHT, PRONGS_TO_CUP = STATE.index("cup_way_z"), STATE.group("prongs_to_cup_")
+PRONGS_TO_CUP_XY, PRONGS_TO_RIM = STATE.slice("prongs_to_cup_x", "prongs_to_cup_y"), STATE.index("prongs_to_rim_z")
+LEFT_CLEARANCE, RIGHT_CLEARANCE = STATE.index("left_clearance"), STATE.index("right_clearance")
+CUP_AXES_Z, CUP_UPRIGHT = STATE.slice("cup_x_axis_z", "cup_y_axis_z", "cup_z_axis_z"), STATE.index("cup_z_axis_z")
+CUP_TURN = STATE.index("cup_y_axis_x")
+
+
 class LiftCup(Task):
     """Lift a cup of given width and height from the table (paper, appendix "Environment Details").
 
@@ -165,40 +212,14 @@ class LiftCup(Task):
     title = "Lift cup"
     horizon = TABLE.max_episode_steps
     control_period = CLOCK.control_period
-    design_space = Box.of(
-        prong_distance=(2.0 * TABLE.box_dimensions_min[1], 2.0 * TABLE.box_dimensions_max[1], "m"),
-        prong_tilt=(float(np.deg2rad(TABLE.tool_angle_min[0])), float(np.deg2rad(TABLE.tool_angle_max[0])), "rad"),
-        prong_width=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
-        prong_length=(2.0 * TABLE.box_dimensions_min[1], 2.0 * TABLE.box_dimensions_max[1], "m"),
-        prong_height=(2.0 * TABLE.box_dimensions_min[2], 2.0 * TABLE.box_dimensions_max[2], "m"),
-    )
+    design_space = DESIGN
     tool_graph = FORK_GRAPH
     control_space = Box.of(
         move_x=(-MAX_MOVE, MAX_MOVE, "m"), move_y=(-MAX_MOVE, MAX_MOVE, "m"), move_z=(-MAX_MOVE, MAX_MOVE, "m")
     )
-    instance_space = Box.of(cup_width_scale=(0.3, 0.9, "0.18 m"), cup_height_scale=(0.6, 0.9, "0.18 m"))
+    instance_space = INSTANCE
     goal_size = 2
-    state_space = Box.of(
-        held_x=(WORKSPACE.low[0], WORKSPACE.high[0], "m"),
-        held_y=(WORKSPACE.low[1], WORKSPACE.high[1], "m"),
-        held_z=(WORKSPACE.low[2], WORKSPACE.high[2], "m"),
-        cup_way_x=(-1.0, 1.0, "m"),
-        cup_way_y=(-1.0, 1.0, "m"),
-        cup_way_z=(-1.0, 1.0, "m"),
-        prongs_to_cup_x=(-1.0, 1.0, "m"),
-        prongs_to_cup_y=(-1.0, 1.0, "m"),
-        prongs_to_cup_z=(-1.0, 1.0, "m"),
-        prongs_to_rim_z=(-1.0, 1.0, "m"),
-        left_clearance=(-1.0, 1.0, "m"),
-        right_clearance=(-1.0, 1.0, "m"),
-        cup_x_axis_z=(-1.0, 1.0, "-"),
-        cup_y_axis_z=(-1.0, 1.0, "-"),
-        cup_z_axis_z=(-1.0, 1.0, "-"),
-        cup_y_axis_x=(-1.0, 1.0, "-"),
-        cup_velocity_x=(-5.0, 5.0, "m/s"),
-        cup_velocity_y=(-5.0, 5.0, "m/s"),
-        cup_velocity_z=(-5.0, 5.0, "m/s"),
-    )
+    state_space = STATE
 
     outcome = Quantity("height of the cup's lowest corner while upright", "m")
     max_slots = MAX_SLOTS
@@ -224,7 +245,9 @@ class LiftCup(Task):
 
     def script(self) -> Behaviour:
         """Return a script that puts the prongs beside the cup and lifts."""
-        return _Script(self)
+        from ._scripts.lift_cup import LiftCupScript  # here, since that file reads this one
+
+        return LiftCupScript(self)
 
     def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
         """Return a simulator of `num_slots` cups and forks."""
@@ -343,7 +366,7 @@ class _LiftCupSimulator(BulletSimulator):
         self.centre_height = np.zeros(num_slots)
         """(B,) of the cup's centre of mass above its underside, m."""
         self.cup_start = np.zeros((num_slots, 3))
-        self.designs = np.zeros((num_slots, 5))
+        self.designs = np.zeros((num_slots, DESIGN.size))
         self.prong_middle = np.zeros((num_slots, 3))
         self.lowest_hold = np.zeros(num_slots)
         """(B,) smallest allowed height of the held end, m."""
@@ -367,8 +390,8 @@ class _LiftCupSimulator(BulletSimulator):
         self.success[slots] = self.failure[slots] = False
         self.pose[slots] = TOOL_START
         self.state[slots] = 0.0
-        self.state[slots, :3] = TOOL_START
-        self.state[slots, 14] = 1.0
+        self.state[slots, HELD] = TOOL_START
+        self.state[slots, CUP_UPRIGHT] = 1.0
 
     def build_scene(self, slot: int) -> list[int]:
         """Add table and cup."""
@@ -423,8 +446,9 @@ class _LiftCupSimulator(BulletSimulator):
         """Write state, outcome and both ends; return the reward's potential (b,)."""
         held, cup = self.pose[slots], self.bodies[slots, 0]
         width, height = self.size[slots].T
-        place, turn = cup[:, :3], rotation_matrices(cup[:, 3:7])
+        place, turn = cup[:, PLACE], rotation_matrices(cup[:, ROTATION])
         axes = turn[:, 2]
+        # Corners of the underside are at (+-width / 2, +-width / 2, -centre_height); the lowest has both signs down.
         lowest = place[:, 2] - 0.5 * width * np.abs(axes[:, :2]).sum(axis=1) - self.centre_height[slots] * axes[:, 2]
         upright = axes[:, 2] > UPRIGHT
         lifted = np.where(upright, np.maximum(lowest, 0.0), 0.0)
@@ -437,15 +461,15 @@ class _LiftCupSimulator(BulletSimulator):
         prong_top = middle[:, 2] + 0.5 * prong_height / np.cos(tilt)
         rim = height - RIM_THICKNESS - self.centre_height[slots]
         state = self.state
-        state[slots, 0:3] = held
-        state[slots, 3:6] = place - self.cup_start[slots]
-        state[slots, 6:9] = place - middle
-        state[slots, 9] = place[:, 2] + rim - prong_top
-        state[slots, 10] = place[:, 0] - held[:, 0] + 0.5 * (distance - width)
-        state[slots, 11] = held[:, 0] - place[:, 0] + 0.5 * (distance - width)
-        state[slots, 12:15] = axes
-        state[slots, 15] = turn[:, 0, 1]
-        state[slots, 16:19] = cup[:, 7:10]
+        state[slots, HELD] = held
+        state[slots, CUP_WAY] = place - self.cup_start[slots]
+        state[slots, PRONGS_TO_CUP] = place - middle
+        state[slots, PRONGS_TO_RIM] = place[:, 2] + rim - prong_top
+        state[slots, LEFT_CLEARANCE] = place[:, 0] - held[:, 0] + 0.5 * (distance - width)
+        state[slots, RIGHT_CLEARANCE] = held[:, 0] - place[:, 0] + 0.5 * (distance - width)
+        state[slots, CUP_AXES_Z] = axes
+        state[slots, CUP_TURN] = turn[:, 0, 1]
+        state[slots, CUP_VELOCITY] = cup[:, VELOCITY]
 
         misfit = self._misfit(slots, place, turn, rim)
         fit = np.exp(-misfit / FIT_LENGTH) - FIT_WEIGHT * misfit
@@ -473,39 +497,3 @@ class _LiftCupSimulator(BulletSimulator):
         points[..., 2] -= top
         result: Floats = np.linalg.norm(points, axis=2)
         return result
-
-
-class _Script(Behaviour):
-    """Brings the prongs' middle, or the cross bar, up to the cup with the prongs at its sides; then lifts."""
-
-    TOLERANCE = 0.004
-    """The held end this near to its aim lifts, m."""
-    BAR_DISTANCE = 0.005
-    """Free way that the cross bar leaves before the cup's wall, m."""
-    LIFTED = 0.003
-    """A cup this high is on its way up, whatever its place, m."""
-    PRONGS: ClassVar[tuple[float, ...]] = (0.0, 0.015, 0.2, 0.04)
-    """Tilt (rad), width, length and height (m) of the script's own tools."""
-
-    def __init__(self, task: LiftCup) -> None:
-        self.task = task
-
-    def design(self, observation: Singles) -> Singles:
-        """Return long level prongs whose inner faces pass under the middle of the rim."""
-        seen = np.atleast_2d(observation)
-        width = CUP_UNIT * seen[:, self.task.layout.goal][:, 0]
-        designs = np.column_stack([width + RIM_WIDTH, np.tile(self.PRONGS, (len(seen), 1))])
-        result: Singles = self.task.design_space.to_unit(designs).astype(np.float32)
-        return result if observation.ndim == 2 else result[0]
-
-    def act(self, observation: Singles) -> Singles:
-        """Return the held end's move, normalised."""
-        seen = np.atleast_2d(observation).astype(np.float64)
-        _, tilt, _, length, _ = self.task.design_space.from_unit(seen[:, self.task.layout.design]).T
-        width = CUP_UNIT * seen[:, self.task.layout.goal][:, 0]
-        short_of_cup = np.maximum(0.0, 0.5 * width + self.BAR_DISTANCE - 0.5 * length * np.cos(tilt))
-        way = seen[:, 6:8] - np.column_stack([0.0 * width, short_of_cup])
-        there: Booleans = (np.abs(way) < self.TOLERANCE).all(axis=1) | (seen[:, 5] > self.LIFTED)
-        moves = np.column_stack([way / MAX_MOVE, there])
-        result: Singles = np.clip(moves, -1.0, 1.0).astype(np.float32)
-        return result if observation.ndim == 2 else result[0]

@@ -5,8 +5,6 @@ Shapes: `b` slots a call names, `I` = 2 instance (goal x, y), `D` = 5 design, `C
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 import pymunk
 
@@ -18,7 +16,6 @@ from codesign_bench.task import (
     Floats,
     Quantity,
     Simulator,
-    Singles,
     Slots,
     Soundness,
     Task,
@@ -29,15 +26,19 @@ from ._planar import (
     CHAIN_GRAPH,
     COLOURS,
     LINK_HALF_WIDTH,
+    PLACE,
+    VELOCITY,
     Canvas,
     Clock,
     PlanarSimulator,
     View,
     chain_design_space,
+    chain_material,
     chain_parts,
     chain_points,
     chain_tool,
 )
+from ._scene import nearest_clear_shift
 
 TABLE = PLANAR_SCENES["push"]
 
@@ -76,6 +77,26 @@ SUCCESS_REWARD = 1.0
 
 CLOCK = Clock(steps=2, period=1.0 / 60.0)
 """Two physics steps per control step (ours), each as long as the early scenes', s."""
+
+
+STATE = Box.of(
+    puck_x=(-6.0, 30.0, "m"),
+    puck_y=(-6.0, 30.0, "m"),
+    puck_velocity_x=(-20.0, 20.0, "m/s"),
+    puck_velocity_y=(-20.0, 20.0, "m/s"),
+    base_x=(WORKSPACE.low[0], WORKSPACE.high[0], "m"),
+    base_y=(WORKSPACE.low[1], WORKSPACE.high[1], "m"),
+    puck_to_goal_x=(-25.0, 25.0, "m"),
+    puck_to_goal_y=(-25.0, 25.0, "m"),
+    base_to_puck_x=(-25.0, 25.0, "m"),
+    base_to_puck_y=(-25.0, 25.0, "m"),
+)
+PUCK, PUCK_VELOCITY = STATE.slice("puck_x", "puck_y"), STATE.slice("puck_velocity_x", "puck_velocity_y")
+BASE, PUCK_TO_GOAL = STATE.slice("base_x", "base_y"), STATE.slice("puck_to_goal_x", "puck_to_goal_y")
+BASE_TO_PUCK = STATE.slice("base_to_puck_x", "base_to_puck_y")
+
+PUCK_BODY, TOOL_BODY = 0, 1
+"""Rows of `PlanarSimulator.bodies`."""
 
 
 class Push(Task):
@@ -137,18 +158,7 @@ class Push(Task):
         goal_y=(PUCK_START[1] - GOAL_DISTANCE[1], PUCK_START[1] + GOAL_DISTANCE[1], "m"),
     )
     goal_size = 2
-    state_space = Box.of(
-        puck_x=(-6.0, 30.0, "m"),
-        puck_y=(-6.0, 30.0, "m"),
-        puck_velocity_x=(-20.0, 20.0, "m/s"),
-        puck_velocity_y=(-20.0, 20.0, "m/s"),
-        base_x=(WORKSPACE.low[0], WORKSPACE.high[0], "m"),
-        base_y=(WORKSPACE.low[1], WORKSPACE.high[1], "m"),
-        puck_to_goal_x=(-25.0, 25.0, "m"),
-        puck_to_goal_y=(-25.0, 25.0, "m"),
-        base_to_puck_x=(-25.0, 25.0, "m"),
-        base_to_puck_y=(-25.0, 25.0, "m"),
-    )
+    state_space = STATE
 
     outcome = Quantity("distance from puck to goal", "m")
     # A puck between two links at once leaves up to a fifth faster than they move, until the contact solver has both.
@@ -168,7 +178,7 @@ class Push(Task):
         two patches of fetch cube).
         """
         near, far = GOAL_DISTANCE
-        offset = instances[:, :2] - PUCK_START
+        offset = instances - PUCK_START
         area = ((offset**2).sum(axis=1) - near**2) / (far**2 - near**2)
         turn = np.abs(np.arctan2(offset[:, 1], offset[:, 0])) / np.pi
         reach = 0.5 * np.sqrt(fraction)
@@ -177,8 +187,7 @@ class Push(Task):
 
     def material(self, designs: Floats) -> Floats:
         """Return the used share of the largest total link length for designs (b, D) in their units."""
-        total: Floats = designs[:, :3].sum(axis=1) / sum(self.design_space.high[:3])
-        return total
+        return chain_material(designs, self.design_space)
 
     def effort(self, controls: Floats) -> Floats:
         """Return the share of the largest speed of the held end for controls (b, C) in [-1, 1]."""
@@ -191,7 +200,9 @@ class Push(Task):
 
     def script(self) -> Behaviour:
         """Return a script that pulls or pushes the puck with whichever part of a tool lies behind it."""
-        return _Script(self)
+        from ._scripts.push import PushScript  # here, since that file reads this one
+
+        return PushScript(self)
 
     def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
         """Return a simulator of `num_slots` pucks and tools."""
@@ -219,14 +230,14 @@ class _PushSimulator(PlanarSimulator):
         self.rest_steps[slots] = 0
         self.reward[slots] = 0.0
         self.success[slots] = False
-        self.bodies[slots, 0] = (*PUCK_START, 0.0, 0.0)
-        self.bodies[slots, 1] = (*TOOL_START, 0.0, 0.0)
+        self.bodies[slots, PUCK_BODY] = (*PUCK_START, 0.0, 0.0)
+        self.bodies[slots, TOOL_BODY] = (*TOOL_START, 0.0, 0.0)
         self._write_state(slots)
 
     def build(self, slots: Slots, designs: Floats) -> None:
         """Build the scenes with tools of `designs` (b, D)."""
         points = chain_points(designs, FIRST_LINK_ANGLE)
-        self.bodies[slots, 1, 0] = TOOL_START[0] + start_shift(points)
+        self.bodies[slots, TOOL_BODY, 0] = TOOL_START[0] + start_shift(points)
         self._write_state(slots)
         self.add_spaces(slots, points)
 
@@ -242,7 +253,7 @@ class _PushSimulator(PlanarSimulator):
         table.max_bias = 0.0
         table.max_force = mass * PUCK_DECELERATION
         tool, links = chain_tool(points, CONTACT_FRICTION)
-        tool.position = tuple(self.bodies[slot, 1, :2].tolist())
+        tool.position = tuple(self.bodies[slot, TOOL_BODY, PLACE].tolist())
         space.add(puck, disc, table)
         space.add(tool, *links)
         self.tools[slot] = tool
@@ -251,16 +262,16 @@ class _PushSimulator(PlanarSimulator):
     def step(self, slots: Slots, controls: Floats) -> None:
         """Move the held ends by `controls` (b, C) for one control step and reward the pucks' progress."""
         period = self.clock.control_period
-        base = self.bodies[slots, 1, :2]
+        base = self.bodies[slots, TOOL_BODY, PLACE]
         velocity = (np.clip(base + controls * (MAX_SPEED * period), *WORKSPACE.bounds) - base) / period
         for slot, pair in zip(slots.tolist(), velocity.tolist(), strict=True):
             tool = self.tools[slot]
             assert tool is not None, "a tool is built before it is moved"
             tool.velocity = tuple(pair)
         self.advance(slots)
-        puck = self.read_bodies(slots)[:, 0]
-        distance = np.linalg.norm(puck[:, :2] - self.goal[slots], axis=1)
-        resting = (distance < GOAL_RADIUS) & (np.linalg.norm(puck[:, 2:], axis=1) < REST_SPEED)
+        puck = self.read_bodies(slots)[:, PUCK_BODY]
+        distance = np.linalg.norm(puck[:, PLACE] - self.goal[slots], axis=1)
+        resting = (distance < GOAL_RADIUS) & (np.linalg.norm(puck[:, VELOCITY], axis=1) < REST_SPEED)
         self.rest_steps[slots] = np.where(resting, self.rest_steps[slots] + 1, 0)
         self.success[slots] = self.rest_steps[slots] >= REST_STEPS
         progress = (self.distance[slots] - distance) / self.start_distance[slots]
@@ -274,89 +285,17 @@ class _PushSimulator(PlanarSimulator):
         canvas.circle(self.goal[slot].tolist(), GOAL_RADIUS, COLOURS["goal"], filled=False)
 
     def _write_state(self, slots: Slots) -> None:
-        bodies = self.bodies[slots]
-        self.state[slots, :4] = bodies[:, 0]
-        self.state[slots, 4:6] = bodies[:, 1, :2]
-        self.state[slots, 6:8] = self.goal[slots] - bodies[:, 0, :2]
-        self.state[slots, 8:] = bodies[:, 0, :2] - bodies[:, 1, :2]
-
-
-class _Script(Behaviour):
-    """Brings a point of the tool behind the puck as seen from the goal, then moves on towards the goal.
-
-    Every link has a few candidate points on both of its sides; the one whose side faces the goal best and that is near
-    is taken. The way there is straight, so the puck may be pushed aside on it: what a tool is good for depends on its
-    shape.
-    """
-
-    SHAPES: ClassVar[tuple[tuple[float, ...], ...]] = (
-        (0.8, 0.9, -0.2, 0.2, 0.9),  # goals to the right: a long arm with a hook behind the puck
-        (0.8, 0.9, -0.2, 0.2, 0.9),  # right above: none of 500 random tools solves these with this controller
-        (-0.4, 0.2, -0.3, 0.5, 0.2),  # above: a slanted arm that lifts the puck on its way to the left
-        (-0.6, 0.8, -0.8, 0.4, -0.4),
-        (-0.2, 0.8, -0.8, 0.4, 0.6),  # left: down on the near side of the puck
-        (-0.2, -0.8, -0.3, -0.6, 0.5),
-        (0.9, -0.1, 0.8, -0.1, 0.5),  # below: a hollow arm above the puck
-        (0.6, -0.8, 0.8, 0.5, -0.6),
-    )
-    """The best of 500 random tools for goals in each eighth of all directions, from the right anticlockwise."""
-    POINTS_PER_LINK = 4
-    NEARNESS = 0.15
-    """What a metre of way costs, in units of the cosine between a link's side and the way to the goal."""
-
-    def __init__(self, task: Push) -> None:
-        self.task = task
-
-    def design(self, observation: Singles) -> Singles:
-        """Return one of eight tools by the goal's direction."""
-        to_goal = observation[..., 6:8]
-        count = len(self.SHAPES)
-        turn = np.arctan2(to_goal[..., 1], to_goal[..., 0]) / (2.0 * np.pi)
-        shapes: Singles = np.array(self.SHAPES, dtype=np.float32)[np.round(count * turn).astype(int) % count]
-        return shapes
-
-    def act(self, observation: Singles) -> Singles:
-        """Return the held end's velocity, normalised."""
-        seen = np.atleast_2d(observation).astype(np.float64)
-        puck, base, to_goal = seen[:, 0:2], seen[:, 4:6], seen[:, 6:8]
-        distance = np.linalg.norm(to_goal, axis=1, keepdims=True)
-        heading = to_goal / np.maximum(distance, 1e-9)
-        points, sides = self._places(seen[:, self.task.layout.design])
-        held = puck[:, None] - (PUCK_RADIUS + LINK_HALF_WIDTH) * sides - points
-        reachable = np.clip(held, *WORKSPACE.bounds)
-        cost = np.linalg.norm(reachable - base[:, None], axis=2) + 5.0 * np.linalg.norm(reachable - held, axis=2)
-        score = (sides * heading[:, None]).sum(axis=2) - self.NEARNESS * cost
-        rows = np.arange(len(seen))
-        way = held[rows, score.argmax(axis=1)] - base
-        ready = np.linalg.norm(way, axis=1, keepdims=True) < 0.4
-        speed = np.clip((distance - 0.5 * GOAL_RADIUS) / GOAL_RADIUS, 0.0, 0.7)
-        control = np.where(ready, way + speed * heading, np.clip(way, -1.0, 1.0))
-        result: Singles = np.clip(control, -1.0, 1.0).astype(np.float32)
-        return result if observation.ndim == 2 else result[0]
-
-    def _places(self, designs: Floats) -> tuple[Floats, Floats]:
-        """Return points on the links, from the held end, and the direction in which each pushes: (B, P, 2) twice."""
-        chain = chain_points(self.task.design_space.from_unit(designs), FIRST_LINK_ANGLE)
-        link = chain[:, 1:] - chain[:, :-1]
-        share = (np.arange(self.POINTS_PER_LINK) + 0.5) / self.POINTS_PER_LINK
-        points = (chain[:, :-1, None] + share[:, None] * link[:, :, None]).reshape(len(designs), -1, 2)
-        normal = np.stack([-link[..., 1], link[..., 0]], axis=-1) / np.linalg.norm(link, axis=-1, keepdims=True)
-        sides = np.repeat(normal, self.POINTS_PER_LINK, axis=1)
-        return np.concatenate([points, points], axis=1), np.concatenate([sides, -sides], axis=1)
+        puck, base = self.bodies[slots, PUCK_BODY], self.bodies[slots, TOOL_BODY, PLACE]
+        self.state[slots, PUCK] = puck[:, PLACE]
+        self.state[slots, PUCK_VELOCITY] = puck[:, VELOCITY]
+        self.state[slots, BASE] = base
+        self.state[slots, PUCK_TO_GOAL] = self.goal[slots] - puck[:, PLACE]
+        self.state[slots, BASE_TO_PUCK] = puck[:, PLACE] - base
 
 
 def start_shift(points: Floats) -> Floats:
-    """Return how far (b,) tools with chain `points` (b, 4, 2) must start from `TOOL_START` along x to be clear, in m.
-
-    Along x, a link is too close to the puck over one interval. The tool starts at the place nearest to no shift that
-    lies in no link's interval: at zero or at an end of an interval.
-    """
-    low, high = _blocked_shifts(points)
-    candidates = np.concatenate([np.zeros((len(points), 1)), low, high], axis=1)
-    inside = (candidates[:, :, None] > low[:, None] + 1e-9) & (candidates[:, :, None] < high[:, None] - 1e-9)
-    distance = np.where(inside.any(axis=2) | np.isnan(candidates), np.inf, np.abs(candidates))
-    result: Floats = candidates[np.arange(len(points)), distance.argmin(axis=1)]
-    return result
+    """Return how far (b,) from `TOOL_START` tools with chain `points` (b, 4, 2) start along x to be clear, in m."""
+    return nearest_clear_shift(*_blocked_shifts(points))
 
 
 def _blocked_shifts(points: Floats) -> tuple[Floats, Floats]:
@@ -366,17 +305,20 @@ def _blocked_shifts(points: Floats) -> tuple[Floats, Floats]:
     at which one of its ends lies in the disc, or its inner part crosses the disc; together they are one interval.
     """
     reach = PUCK_RADIUS + LINK_HALF_WIDTH + START_CLEARANCE
+    # The links as seen from the puck, without a shift.
     start, end = points[:, :-1] + TOOL_START - PUCK_START, points[:, 1:] + TOOL_START - PUCK_START
     lows, highs = [], []
     for at in (start, end):
+        # An end moves along the chord that the disc cuts out of its height; above or below the disc there is none.
         half = np.sqrt(np.where(np.abs(at[..., 1]) < reach, reach**2 - at[..., 1] ** 2, np.nan))
         lows.append(-at[..., 0] - half)
         highs.append(-at[..., 0] + half)
     length = np.linalg.norm(end - start, axis=-1)
     direction = (end - start) / length[..., None]
     normal = np.stack([-direction[..., 1], direction[..., 0]], axis=-1)
-    across = np.where(np.abs(normal[..., 0]) > 1e-9, normal[..., 0], np.nan)
+    across = np.where(np.abs(normal[..., 0]) > 1e-9, normal[..., 0], np.nan)  # A level link does not move sideways.
     for side in (-reach, reach):
+        # The link's line touches the disc at this shift; it counts if the point of contact is on the link itself.
         shift = (side - (start * normal).sum(-1)) / across
         along = -((start * direction).sum(-1) + shift * direction[..., 0])
         touches = np.where((along > 0.0) & (along < length), shift, np.nan)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import ClassVar
 
 import numpy as np
 import pymunk
@@ -23,7 +22,6 @@ from codesign_bench.task import (
     Physics,
     Quantity,
     Simulator,
-    Singles,
     Slots,
     Soundness,
     Task,
@@ -33,11 +31,14 @@ from codesign_bench.task import (
 from ._planar import (
     CHAIN_GRAPH,
     COLOURS,
+    PLACE,
+    VELOCITY,
     Canvas,
     Clock,
     PlanarSimulator,
     View,
     chain_design_space,
+    chain_material,
     chain_parts,
     chain_points,
     overlap,
@@ -140,6 +141,43 @@ SLOP = 0.02
 """Overlap of two bodies that the contact solver leaves alone, m (ours)."""
 
 
+CONTROL = Box.of(
+    velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"),
+    velocity_y=(-MAX_SPEED, MAX_SPEED, "m/s"),
+    angular_velocity=(-MAX_TURN, MAX_TURN, "rad/s"),
+)
+MOVE, MOVE_UP = CONTROL.slice("velocity_x", "velocity_y"), CONTROL.index("velocity_y")
+TURN = CONTROL.index("angular_velocity")
+INSTANCE = Box.of(
+    wanted=(*GOAL_NUMBERS, "balls"), pile=(0, NUM_PILES - 1, ""), start_shift=(-START_SHIFT, START_SHIFT, "m")
+)
+WANTED, PILE, SHIFT = INSTANCE.index("wanted"), INSTANCE.index("pile"), INSTANCE.index("start_shift")
+STATE = Box.of(
+    joint_1_x=(0.0, 40.0, "m"),
+    joint_1_y=(0.0, 40.0, "m"),
+    tilt=(-1.0, 1.0, "rad"),
+    lowest_y=(0.0, 40.0, "m"),
+    velocity_x=(-20.0, 20.0, "m/s"),
+    velocity_y=(-20.0, 20.0, "m/s"),
+    angular_velocity=(-10.0, 10.0, "rad/s"),
+    held=(0.0, NUM_BALLS, "balls"),
+    held_less_wanted=(-NUM_BALLS, NUM_BALLS, "balls"),
+    held_steps=(0.0, HELD_STEPS, "steps"),
+    joint_1_to_joint_2_x=(-10.0, 10.0, "m"),
+    joint_1_to_joint_2_y=(-10.0, 10.0, "m"),
+    joint_1_to_tip_x=(-10.0, 10.0, "m"),
+    joint_1_to_tip_y=(-10.0, 10.0, "m"),
+    **{f"wants_{number}": (0.0, 1.0, "") for number in range(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)},
+)
+JOINT, JOINT_VELOCITY = STATE.slice("joint_1_x", "joint_1_y"), STATE.slice("velocity_x", "velocity_y")
+TILT, ANGULAR_VELOCITY, LOWEST = STATE.index("tilt"), STATE.index("angular_velocity"), STATE.index("lowest_y")
+HELD, HELD_LESS_WANTED, HELD_FOR = (STATE.index(name) for name in ("held", "held_less_wanted", "held_steps"))
+SHAPE, WANTS = STATE.group("joint_1_to_"), STATE.group("wants_")
+
+BALL_BODIES, TOOL_BODY = slice(0, NUM_BALLS), NUM_BALLS
+"""Rows of `PlanarSimulator.bodies`; the place of a tool is that of its first joint."""
+
+
 class Scoop(Task):
     """Scoop a wanted number of balls out of a reservoir (paper, appendix "Environment Details").
 
@@ -201,32 +239,10 @@ class Scoop(Task):
         TABLE.tool_length_init, TABLE.tool_length_ratio, TABLE.tool_angle_scale, TABLE.tool_angle_ratio
     )
     tool_graph = CHAIN_GRAPH
-    control_space = Box.of(
-        velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"),
-        velocity_y=(-MAX_SPEED, MAX_SPEED, "m/s"),
-        angular_velocity=(-MAX_TURN, MAX_TURN, "rad/s"),
-    )
-    instance_space = Box.of(
-        wanted=(*GOAL_NUMBERS, "balls"), pile=(0, NUM_PILES - 1, ""), start_shift=(-START_SHIFT, START_SHIFT, "m")
-    )
+    control_space = CONTROL
+    instance_space = INSTANCE
     goal_size = 1
-    state_space = Box.of(
-        joint_1_x=(0.0, 40.0, "m"),
-        joint_1_y=(0.0, 40.0, "m"),
-        tilt=(-1.0, 1.0, "rad"),
-        lowest_y=(0.0, 40.0, "m"),
-        velocity_x=(-20.0, 20.0, "m/s"),
-        velocity_y=(-20.0, 20.0, "m/s"),
-        angular_velocity=(-10.0, 10.0, "rad/s"),
-        held=(0.0, NUM_BALLS, "balls"),
-        held_less_wanted=(-NUM_BALLS, NUM_BALLS, "balls"),
-        held_steps=(0.0, HELD_STEPS, "steps"),
-        joint_1_to_joint_2_x=(-10.0, 10.0, "m"),
-        joint_1_to_joint_2_y=(-10.0, 10.0, "m"),
-        joint_1_to_tip_x=(-10.0, 10.0, "m"),
-        joint_1_to_tip_y=(-10.0, 10.0, "m"),
-        **{f"wants_{number}": (0.0, 1.0, "") for number in range(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)},
-    )
+    state_space = STATE
 
     outcome = Quantity("balls held out of the reservoir", "balls")
     soundness = Soundness(overlap=MAX_BALL_SPEED * CLOCK.period, speed=MAX_BALL_SPEED, outcome_change=0.3, chaotic=True)
@@ -240,8 +256,7 @@ class Scoop(Task):
 
     def material(self, designs: Floats) -> Floats:
         """Return the used share of the largest total link length for designs (b, D) in their units."""
-        total: Floats = designs[:, :3].sum(axis=1) / sum(self.design_space.high[:3])
-        return total
+        return chain_material(designs, self.design_space)
 
     def effort(self, controls: Floats) -> Floats:
         """Return the share of the largest velocity, all three entries normalised, for controls (b, C) in [-1, 1]."""
@@ -255,7 +270,9 @@ class Scoop(Task):
 
     def script(self) -> Behaviour:
         """Return a script that lifts whatever tool it is given straight up, and designs a ladle for every number."""
-        return _Script(self)
+        from ._scripts.scoop import ScoopScript  # here, since that file reads this one
+
+        return ScoopScript(self)
 
     def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
         """Return a simulator of `num_slots` piles and tools."""
@@ -272,8 +289,8 @@ class _ScoopSimulator(PlanarSimulator):
         self.wanted = np.ones(num_slots)
         self.chain = np.zeros((num_slots, 4, 2))
         """(B, 4, 2) points of the upright tool from its first joint, m."""
-        self.turn = np.zeros((num_slots, 2))
-        """(B, 2) tilt, rad, and angular velocity, rad/s."""
+        self.tilt, self.spin = np.zeros(num_slots), np.zeros(num_slots)
+        """(B,) angle, rad, and angular velocity, rad/s, of the tools."""
         self.lowest = np.zeros(num_slots)
         """(B,) y of the tool's lowest point, m."""
         self.held_steps = np.zeros(num_slots)
@@ -286,14 +303,22 @@ class _ScoopSimulator(PlanarSimulator):
 
     def begin(self, slots: Slots, instances: Floats) -> None:
         """Put the piles of `instances` (b, I) into the reservoirs."""
-        wanted, pile = np.rint(instances[:, :2]).astype(int).T
+        wanted, pile = (np.rint(instances[:, entry]).astype(int) for entry in (WANTED, PILE))
         self.wanted[slots] = wanted
         self.bodies[slots] = 0.0
-        self.bodies[slots, :NUM_BALLS, :2] = settled_piles()[pile]
-        self.bodies[slots, NUM_BALLS, :2] = TOOL_START
-        self.bodies[slots, NUM_BALLS, 0] += instances[:, 2]
+        self.bodies[slots, BALL_BODIES, PLACE] = settled_piles()[pile]
+        self.bodies[slots, TOOL_BODY, PLACE] = TOOL_START
+        self.bodies[slots, TOOL_BODY, 0] += instances[:, SHIFT]
         self.chain[slots] = 0.0
-        for values in (self.turn, self.hand_velocity, self.outcome, self.held_steps, self.progress, self.reward):
+        for values in (
+            self.tilt,
+            self.spin,
+            self.hand_velocity,
+            self.outcome,
+            self.held_steps,
+            self.progress,
+            self.reward,
+        ):
             values[slots] = 0.0
         self.success[slots] = False
         self.lowest[slots] = TOOL_START[1]
@@ -304,10 +329,10 @@ class _ScoopSimulator(PlanarSimulator):
         points = chain_points(designs, FIRST_LINK_ANGLE)
         chain = points - points[:, 1:2]
         self.chain[slots] = chain
-        self.bodies[slots, NUM_BALLS, 1] = TOOL_START[1] - chain[..., 1].min(axis=1)
-        places = chain + self.bodies[slots, NUM_BALLS, None, :2]
+        self.bodies[slots, TOOL_BODY, 1] = TOOL_START[1] - chain[..., 1].min(axis=1)
+        places = chain + self.bodies[slots, TOOL_BODY, None, PLACE]
         for slot, tool in zip(slots.tolist(), places, strict=True):
-            self.bodies[slot, :NUM_BALLS, :2] = make_room(self.bodies[slot, :NUM_BALLS, :2], tool)
+            self.bodies[slot, BALL_BODIES, PLACE] = make_room(self.bodies[slot, BALL_BODIES, PLACE], tool)
         self.add_spaces(slots, chain)
         self._look(slots)
 
@@ -316,11 +341,11 @@ class _ScoopSimulator(PlanarSimulator):
         space, balls = empty_reservoir(), self.balls[slot]
         if balls is None:
             balls = self.balls[slot] = Balls.new()
-            balls.move(None, space, self.bodies[slot, :NUM_BALLS, :2])
+            balls.move(None, space, self.bodies[slot, BALL_BODIES, PLACE])
         else:
-            balls.move(self.spaces[slot], space, self.bodies[slot, :NUM_BALLS, :2])
+            balls.move(self.spaces[slot], space, self.bodies[slot, BALL_BODIES, PLACE])
         tool = pymunk.Body(TOOL_MASS, TOOL_MOMENT)
-        tool.position = tuple(self.bodies[slot, NUM_BALLS, :2].tolist())
+        tool.position = tuple(self.bodies[slot, TOOL_BODY, PLACE].tolist())
         links = [pymunk.Segment(tool, tuple(a), tuple(b), LINK_HALF_WIDTH) for a, b in pairwise(points.tolist())]
         for link in links:
             link.friction = TOOL_FRICTION
@@ -344,8 +369,9 @@ class _ScoopSimulator(PlanarSimulator):
             hand.angular_velocity = spin
         self.advance(slots)
         self.read_bodies(slots)
-        tools = [self.tools[slot] for slot in slots.tolist()]
-        self.turn[slots] = [(tool.angle, tool.angular_velocity) for tool in tools if tool is not None]
+        tools = [tool for slot in slots.tolist() if (tool := self.tools[slot]) is not None]
+        self.tilt[slots] = [tool.angle for tool in tools]
+        self.spin[slots] = [tool.angular_velocity for tool in tools]
         before = self.progress[slots]
         self._look(slots)
         self.success[slots] = self.held_steps[slots] >= HELD_STEPS
@@ -356,11 +382,11 @@ class _ScoopSimulator(PlanarSimulator):
         """Return the balls' deepest overlap, the speed of the fastest, and whether all are inside the outer walls."""
         space = self.spaces[slot]
         balls = [shape for shape in space.shapes if isinstance(shape, pymunk.Circle)]
-        places = self.bodies[slot, :NUM_BALLS, :2]
+        places = self.bodies[slot, BALL_BODIES, PLACE]
         inside = (places[:, 0] > YARD[0]) & (places[:, 0] < YARD[1]) & (places[:, 1] > FLOOR)
         return Physics(
             overlap=max(overlap(space, ball) for ball in balls),
-            speed=float(np.linalg.norm(self.bodies[slot, :NUM_BALLS, 2:], axis=1).max()),
+            speed=float(np.linalg.norm(self.bodies[slot, BALL_BODIES, VELOCITY], axis=1).max()),
             contained=bool(inside.all()),
         )
 
@@ -371,16 +397,16 @@ class _ScoopSimulator(PlanarSimulator):
     def _allowed(self, slots: Slots, controls: Floats) -> tuple[Floats, Floats]:
         """Return velocity (b, 2) and angular velocity (b,) for `controls` (b, C) that keep tools where they may be."""
         period = self.clock.control_period
-        tilt = self.turn[slots, 0]
-        next_tilt = np.clip(tilt + controls[:, 2] * (MAX_TURN * period), -MAX_TILT, MAX_TILT)
+        tilt = self.tilt[slots]
+        next_tilt = np.clip(tilt + controls[:, TURN] * (MAX_TURN * period), -MAX_TILT, MAX_TILT)
         points = rotated(self.chain[slots], next_tilt)
         low, high = points.min(axis=1), points.max(axis=1)
         least = np.array([RESERVOIR[0] + CLEARANCE, TOOL_START[1]]) - low
         most = np.stack([RESERVOIR[1] - CLEARANCE - high[:, 0], CEILING - low[:, 1]], axis=1)
         middle = 0.5 * (least + most)  # A tool that tilting made too wide for both clearances stays in the middle.
-        joint, change = self.bodies[slots, NUM_BALLS, :2], MAX_ACCELERATION * period
+        joint, change = self.bodies[slots, TOOL_BODY, PLACE], MAX_ACCELERATION * period
         before = self.hand_velocity[slots]
-        wish = joint + np.clip(controls[:, :2] * MAX_SPEED, before - change, before + change) * period
+        wish = joint + np.clip(controls[:, MOVE] * MAX_SPEED, before - change, before + change) * period
         target = np.clip(wish, np.minimum(least, middle), np.maximum(most, middle))
         velocity: Floats = np.clip((target - joint) / period, -MAX_SPEED, MAX_SPEED)
         self.hand_velocity[slots] = velocity
@@ -389,13 +415,14 @@ class _ScoopSimulator(PlanarSimulator):
 
     def _look(self, slots: Slots) -> None:
         """Count balls and measure progress; write the state."""
-        balls, tool = self.bodies[slots, :NUM_BALLS], self.bodies[slots, NUM_BALLS, None]
-        wanted, chain = self.wanted[slots], rotated(self.chain[slots], self.turn[slots, 0])
-        self.lowest[slots] = lowest = tool[:, 0, 1] + chain[..., 1].min(axis=1)
-        loaded = above(balls[..., :2] - tool[..., :2], chain)
+        balls, tool = self.bodies[slots, BALL_BODIES], self.bodies[slots, TOOL_BODY]
+        wanted, chain = self.wanted[slots], rotated(self.chain[slots], self.tilt[slots])
+        self.lowest[slots] = lowest = tool[:, 1] + chain[..., 1].min(axis=1)
+        from_tool = balls - tool[:, None]
+        loaded = above(from_tool[..., PLACE], chain)
         number = loaded.sum(axis=1)
         self.outcome[slots] = held = np.where(lowest > CLEAR, number, 0)
-        moving = ((balls[..., 2:] - tool[..., 2:]) ** 2).sum(axis=2) > REST_SPEED**2
+        moving = (from_tool[..., VELOCITY] ** 2).sum(axis=2) > REST_SPEED**2
         right = (held == wanted) & ~(loaded & moving).any(axis=1)
         self.held_steps[slots] = np.where(right, self.held_steps[slots] + 1.0, 0.0)
         lift = np.clip((lowest - TOOL_START[1]) / (CEILING - TOOL_START[1]), 0.0, 1.0)
@@ -404,46 +431,16 @@ class _ScoopSimulator(PlanarSimulator):
         self._write_state(slots, chain)
 
     def _write_state(self, slots: Slots, chain: Floats) -> None:
-        tool, wanted = self.bodies[slots, NUM_BALLS], self.wanted[slots]
-        state = np.empty((len(slots), self.state.shape[1]))
-        state[:, 0:2], state[:, 4:6] = tool[:, :2], tool[:, 2:]
-        state[:, 2], state[:, 6] = self.turn[slots].T
-        state[:, 3] = self.lowest[slots]
-        state[:, 7], state[:, 8] = self.outcome[slots], self.outcome[slots] - wanted
-        state[:, 9] = self.held_steps[slots]
-        state[:, 10:14] = chain[:, 2:].reshape(-1, 4)
-        state[:, 14:] = wanted[:, None] == np.arange(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)
+        tool, wanted = self.bodies[slots, TOOL_BODY], self.wanted[slots]
+        state = np.empty((len(slots), STATE.size))
+        state[:, JOINT], state[:, JOINT_VELOCITY] = tool[:, PLACE], tool[:, VELOCITY]
+        state[:, TILT], state[:, ANGULAR_VELOCITY] = self.tilt[slots], self.spin[slots]
+        state[:, LOWEST] = self.lowest[slots]
+        state[:, HELD], state[:, HELD_LESS_WANTED] = self.outcome[slots], self.outcome[slots] - wanted
+        state[:, HELD_FOR] = self.held_steps[slots]
+        state[:, SHAPE] = chain[:, 2:].reshape(len(slots), -1)
+        state[:, WANTS] = wanted[:, None] == np.arange(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)
         self.state[slots] = state
-
-
-class _Script(Behaviour):
-    """Lifts the tool straight up, so that its shape alone decides how many balls stay on it."""
-
-    SHAPES: ClassVar[tuple[tuple[float, ...], ...]] = (
-        (-0.3, -0.8, -0.9, -0.1, 0.3),
-        (-0.5, 0.0, -0.9, -0.4, 1.0),
-        (0.1, -0.9, -0.7, 0.6, 0.6),
-        (0.5, -1.0, -0.6, 0.9, -0.5),
-        (0.1, -0.9, 0.1, 0.6, 0.4),
-        (0.8, 0.4, -0.9, 0.6, 0.4),
-        (0.2, 0.0, 0.8, 0.8, 0.9),
-    )
-    """A ladle for each of 1 to 7 balls, normalised: the best of a few hundred random tools."""
-
-    def __init__(self, task: Scoop) -> None:
-        self.task = task
-
-    def design(self, observation: Singles) -> Singles:
-        """Return the ladle for the wanted number."""
-        wanted = np.rint(observation[..., self.task.layout.goal][..., 0]).astype(int)
-        shapes: Singles = np.array(self.SHAPES, dtype=np.float32)[wanted - GOAL_NUMBERS[0]]
-        return shapes
-
-    def act(self, observation: Singles) -> Singles:
-        """Return straight up, normalised."""
-        result: Singles = np.zeros((*observation.shape[:-1], self.task.control_space.size), dtype=np.float32)
-        result[..., 1] = 1.0
-        return result
 
 
 def empty_reservoir() -> pymunk.Space:

@@ -6,8 +6,6 @@ Shapes: `b` slots a call names, `I` = 2 instance (balls wanted, pile), `D` = 10 
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 import pybullet
 
@@ -20,7 +18,6 @@ from codesign_bench.task import (
     Physics,
     Quantity,
     Simulator,
-    Singles,
     Slots,
     Soundness,
     Task,
@@ -31,6 +28,8 @@ from codesign_bench.task import (
 from ._bullet import (
     LEVEL,
     MAX_SLOTS,
+    PLACE,
+    VELOCITY,
     Boxes,
     BulletSimulator,
     Camera,
@@ -116,8 +115,66 @@ CLOCK = Clock(steps=4, period=1.0 / 120.0)
 """Four physics steps per control step (ours; the paper has ten), s."""
 
 SIDES = ("back", "front", "left", "right")
+BACK = SIDES.index("back")
+SIDE_NODES = (1, 3, 4, 5)
+"""Their nodes in the tool graph."""
 OUTWARDS = np.array([[0.0, -1.0], [0.0, 1.0], [-1.0, 0.0], [1.0, 0.0]])
 """(P, 2) where the side plates stand, seen from the middle of the bottom plate."""
+
+
+DESIGN = Box.of(
+    bottom_width=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
+    bottom_length=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
+    **{f"{side}_height": (2.0 * TABLE.box_dimensions_min[2], 2.0 * TABLE.box_dimensions_max[2], "m") for side in SIDES},
+    **{
+        f"{side}_angle": (
+            float(np.deg2rad(TABLE.tool_angle_min[0])),
+            float(np.deg2rad(TABLE.tool_angle_max[0])),
+            "rad",
+        )
+        for side in SIDES
+    },
+)
+BOTTOM_WIDTH, BOTTOM_LENGTH = DESIGN.index("bottom_width"), DESIGN.index("bottom_length")
+BOTTOM = DESIGN.slice("bottom_width", "bottom_length")
+"""Along x and y."""
+HEIGHTS, ANGLES = (DESIGN.slice(*(f"{side}_{what}" for side in SIDES)) for what in ("height", "angle"))
+
+CONTROL = Box(
+    names=("move_x", "move_y", "move_z", "turn_x", "turn_y", "turn_z"),
+    low=tuple(CONTROL_SCALE * bound for bound in TABLE.control_action_min),
+    high=tuple(CONTROL_SCALE * bound for bound in TABLE.control_action_max),
+    units=("m", "m", "m", "rad", "rad", "rad"),
+)
+MOVE_UP, TURNS = CONTROL.index("move_z"), CONTROL.group("turn_")
+INSTANCE = Box.of(balls_wanted=(float(WANTED[0]), float(WANTED[1]), "balls"), pile=(0.0, 2.0**20 - 1.0, "1"))
+BALLS_WANTED, PILE = INSTANCE.index("balls_wanted"), INSTANCE.index("pile")
+STATE = Box.of(
+    tool_x=(-0.1, 0.1, "m"),
+    tool_y=(-0.1, 0.2, "m"),
+    tool_z=(-0.1, 0.3, "m"),
+    turn_x=(-0.5, 0.5, "rad"),
+    turn_y=(-0.5, 0.5, "rad"),
+    turn_z=(-0.5, 0.5, "rad"),
+    way_to_line=(-0.3, 0.3, "m"),
+    balls_above=(0.0, BALLS, "balls"),
+    balls_held=(0.0, BALLS, "balls"),
+    balls_missing=(-BALLS, BALLS, "balls"),
+    held_share=(0.0, 1.0, "1"),
+    clear_share=(0.0, 1.0, "1"),
+    centre_x=(-0.2, 0.2, "m"),
+    centre_y=(-0.2, 0.2, "m"),
+    highest_ball=(0.0, 0.5, "m"),
+    **{f"wants_{count}": (0.0, 1.0, "1") for count in range(WANTED[0], WANTED[1] + 1)},
+)
+TOOL_PLACE, TOOL_TURN = STATE.group("tool_"), STATE.group("turn_")
+WAY_TO_LINE, BALLS_ABOVE, BALLS_HELD = (STATE.index(name) for name in ("way_to_line", "balls_above", "balls_held"))
+BALLS_MISSING, HELD_SHARE = STATE.index("balls_missing"), STATE.index("held_share")
+CLEAR_SHARE, CENTRE, HIGHEST_BALL = STATE.index("clear_share"), STATE.group("centre_"), STATE.index("highest_ball")
+WANTS = STATE.group("wants_")
+
+POSE_PLACE, POSE_TURN = slice(0, 3), slice(3, 6)
+"""Axes of a tool's pose: x, y, z (m), and turns about them (rad)."""
 
 
 def _ball_picture(rings: int = 6, columns: int = 9) -> tuple[list[list[float]], list[int]]:
@@ -196,51 +253,14 @@ class Scoop3D(Task):
     title = "Scoop (3D)"
     horizon = TABLE.max_episode_steps
     control_period = CLOCK.control_period
-    design_space = Box.of(
-        bottom_width=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
-        bottom_length=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
-        **{
-            f"{side}_height": (2.0 * TABLE.box_dimensions_min[2], 2.0 * TABLE.box_dimensions_max[2], "m")
-            for side in SIDES
-        },
-        **{
-            f"{side}_angle": (
-                float(np.deg2rad(TABLE.tool_angle_min[0])),
-                float(np.deg2rad(TABLE.tool_angle_max[0])),
-                "rad",
-            )
-            for side in SIDES
-        },
-    )
+    design_space = DESIGN
     tool_graph = ToolGraph(
         num_nodes=6, edges=((0, 1), (1, 2), (2, 3), (2, 4), (2, 5)), parameter_nodes=(2, 2, 1, 3, 4, 5, 1, 3, 4, 5)
     )
-    control_space = Box(
-        names=("move_x", "move_y", "move_z", "turn_x", "turn_y", "turn_z"),
-        low=tuple(CONTROL_SCALE * bound for bound in TABLE.control_action_min),
-        high=tuple(CONTROL_SCALE * bound for bound in TABLE.control_action_max),
-        units=("m", "m", "m", "rad", "rad", "rad"),
-    )
-    instance_space = Box.of(balls_wanted=(float(WANTED[0]), float(WANTED[1]), "balls"), pile=(0.0, 2.0**20 - 1.0, "1"))
+    control_space = CONTROL
+    instance_space = INSTANCE
     goal_size = 1
-    state_space = Box.of(
-        tool_x=(-0.1, 0.1, "m"),
-        tool_y=(-0.1, 0.2, "m"),
-        tool_z=(-0.1, 0.3, "m"),
-        turn_x=(-0.5, 0.5, "rad"),
-        turn_y=(-0.5, 0.5, "rad"),
-        turn_z=(-0.5, 0.5, "rad"),
-        way_to_line=(-0.3, 0.3, "m"),
-        balls_above=(0.0, BALLS, "balls"),
-        balls_held=(0.0, BALLS, "balls"),
-        balls_missing=(-BALLS, BALLS, "balls"),
-        held_share=(0.0, 1.0, "1"),
-        clear_share=(0.0, 1.0, "1"),
-        centre_x=(-0.2, 0.2, "m"),
-        centre_y=(-0.2, 0.2, "m"),
-        highest_ball=(0.0, 0.5, "m"),
-        **{f"wants_{count}": (0.0, 1.0, "1") for count in range(WANTED[0], WANTED[1] + 1)},
-    )
+    state_space = STATE
     outcome = Quantity("balls held above the line", "balls")
     max_slots = MAX_SLOTS
     # Balls that meet at up to 2.8 m/s overlap for a step of 1/120 s, also right after they were poured; tools start
@@ -272,7 +292,9 @@ class Scoop3D(Task):
 
     def script(self) -> Behaviour:
         """Return a script that lifts straight up and holds still."""
-        return _Script(self)
+        from ._scripts.scoop_3d import Scoop3DScript  # here, since that file reads this one
+
+        return Scoop3DScript(self)
 
     def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
         """Return a simulator of `num_slots` reservoirs."""
@@ -297,7 +319,7 @@ class _ScoopSimulator(BulletSimulator):
         self.settling_steps = settling_steps
         self.wanted = np.zeros(num_slots, dtype=np.intp)
         self.piles: list[np.random.Generator] = [np.random.default_rng(0)] * num_slots
-        self.designs = np.zeros((num_slots, Scoop3D.design_space.size))
+        self.designs = np.zeros((num_slots, DESIGN.size))
         self.local = np.zeros((num_slots, BALLS, 3))
         """(B, N, 3) balls in the frame of the tool."""
         self.potential = np.zeros(num_slots)
@@ -306,17 +328,17 @@ class _ScoopSimulator(BulletSimulator):
 
     def begin(self, slots: Slots, instances: Floats) -> None:
         """Fill the reservoirs with the piles of `instances` (b, I)."""
-        self.wanted[slots] = np.rint(instances[:, 0]).astype(np.intp)
-        for slot, pile in zip(slots.tolist(), instances[:, 1].tolist(), strict=True):
+        self.wanted[slots] = np.rint(instances[:, BALLS_WANTED]).astype(np.intp)
+        for slot, pile in zip(slots.tolist(), instances[:, PILE].tolist(), strict=True):
             self.piles[slot] = np.random.default_rng(round(pile))
         self.restart(slots)
         for values in (self.potential, self.held_steps, self.clear_steps, self.reward, self.outcome):
             values[slots] = 0
         self.success[slots] = self.failure[slots] = False
         self.state[slots] = 0.0
-        self.state[slots, 0:3] = TOOL_START
-        self.state[slots, 9] = self.wanted[slots]
-        self.state[slots, 15:] = np.arange(WANTED[0], WANTED[1] + 1) == self.wanted[slots, None]
+        self.state[slots, TOOL_PLACE] = TOOL_START
+        self.state[slots, BALLS_MISSING] = self.wanted[slots]
+        self.state[slots, WANTS] = np.arange(WANTED[0], WANTED[1] + 1) == self.wanted[slots, None]
 
     def build_scene(self, slot: int) -> list[int]:
         """Build floor and walls, and lay the balls on the floor side by side."""
@@ -376,13 +398,14 @@ class _ScoopSimulator(BulletSimulator):
         """Put the tools `designs` (b, D) on the floor and pour the balls that lay there on them."""
         self.designs[slots] = designs
         for slot, design in zip(slots.tolist(), designs, strict=True):
-            balls, world = self.bodies[slot, :, :3], self.worlds[slot]
+            balls, world = self.bodies[slot, :, PLACE], self.worlds[slot]
             inside = np.flatnonzero(touching(design, balls - TOOL_START))
             for ball, place in zip(inside.tolist(), pour(design, len(inside), self.piles[slot]).tolist(), strict=True):
                 pybullet.resetBasePositionAndOrientation(self.moving[slot][ball], place, LEVEL, physicsClientId=world)
-        start = np.tile([*TOOL_START, 0.0, 0.0, 0.0], (len(slots), 1))
+        start = np.zeros((len(slots), CONTROL.size))
+        start[:, POSE_PLACE] = TOOL_START
         self.add_tools(slots, scoop_boxes(designs), start)
-        self.drive(slots, np.zeros((len(slots), 6)))
+        self.drive(slots, np.zeros_like(start))
         for _ in range(self.settling_steps):
             self.advance(slots)
         self._observe(slots)
@@ -404,12 +427,12 @@ class _ScoopSimulator(BulletSimulator):
         self.reward[slots] = progress + TABLE.slack_reward + TABLE.success_reward * success
         self.potential[slots] = potential
         self.outcome[slots] = held
-        self.state[slots, 10] = self.held_steps[slots] / HELD_STEPS
-        self.state[slots, 11] = self.clear_steps[slots] / LOST_STEPS
+        self.state[slots, HELD_SHARE] = self.held_steps[slots] / HELD_STEPS
+        self.state[slots, CLEAR_SHARE] = self.clear_steps[slots] / LOST_STEPS
 
     def inspect(self, slot: int) -> Physics:
         """Return deepest overlap, fastest ball and whether all balls are in the room; balls by their distances."""
-        world, tool, balls = self.worlds[slot], self._tool(slot), self.bodies[slot, :, :3]
+        world, tool, balls = self.worlds[slot], self._tool(slot), self.bodies[slot, :, PLACE]
         apart = np.linalg.norm(balls[:, None] - balls, axis=2) + 2.0 * BALL_RADIUS * np.eye(BALLS)
         others = {pybullet.getBodyUniqueId(index, world) for index in range(pybullet.getNumBodies(world))}
         others |= set(self.moving[slot])
@@ -429,7 +452,7 @@ class _ScoopSimulator(BulletSimulator):
                 *(-point[8] for point in contacts),
                 0.0,
             ),
-            speed=float(np.linalg.norm(self.bodies[slot, :, 7:10], axis=1).max()),
+            speed=float(np.linalg.norm(self.bodies[slot, :, VELOCITY], axis=1).max()),
             contained=bool(((balls >= low) & (balls <= high)).all()),
         )
 
@@ -447,20 +470,20 @@ class _ScoopSimulator(BulletSimulator):
     def _displacements(self, slots: Slots, controls: Floats) -> Floats:
         """Return the (b, 6) changes of pose that `controls` (b, C) ask for, within the limits."""
         pose = self.pose[slots]
-        target = pose + controls * Scoop3D.control_space.bounds[1]
+        target = pose + controls * CONTROL.bounds[1]
         for axis in (0, 1):
             target[:, axis] = np.clip(target[:, axis], TOOL_START[axis] - REACH[axis], TOOL_START[axis] + REACH[axis])
-        target[:, 3:] = np.clip(target[:, 3:], -np.array(LARGEST_TURN), LARGEST_TURN)
-        lowest = FLOOR_CLEARANCE + drop(self.designs[slots], turn_matrices(target[:, 3:]))
+        target[:, POSE_TURN] = np.clip(target[:, POSE_TURN], -np.array(LARGEST_TURN), LARGEST_TURN)
+        lowest = FLOOR_CLEARANCE + drop(self.designs[slots], turn_matrices(target[:, POSE_TURN]))
         target[:, 2] = np.clip(target[:, 2], lowest, HIGHEST)
         displacement: Floats = target - pose
         return displacement
 
     def _observe(self, slots: Slots) -> tuple[Floats, Floats, Booleans, Floats]:
         """Read the worlds; return balls above and held, whether the tools are clear, and the share of the way up."""
-        pose, balls = self.read_tools(slots), self.read_bodies(slots)[:, :, :3]
-        matrices = turn_matrices(pose[:, 3:])
-        local = (balls - pose[:, None, :3]) @ matrices
+        pose, balls = self.read_tools(slots), self.read_bodies(slots)[:, :, PLACE]
+        matrices = turn_matrices(pose[:, POSE_TURN])
+        local = (balls - pose[:, None, POSE_PLACE]) @ matrices
         slow = np.linalg.norm(local - self.local[slots], axis=2) < HELD_SPEED * self.clock.control_period
         self.local[slots] = local
         over = above_bottom(self.designs[slots], local)
@@ -470,14 +493,14 @@ class _ScoopSimulator(BulletSimulator):
         held = (over & slow).sum(axis=1) * clear
         way = LINE - lowest
         state = self.state
-        state[slots, 0:6] = pose
-        state[slots, 6] = way
-        state[slots, 7] = above
-        state[slots, 8] = held
-        state[slots, 9] = self.wanted[slots] - above
+        state[slots, TOOL_PLACE], state[slots, TOOL_TURN] = pose[:, POSE_PLACE], pose[:, POSE_TURN]
+        state[slots, WAY_TO_LINE] = way
+        state[slots, BALLS_ABOVE] = above
+        state[slots, BALLS_HELD] = held
+        state[slots, BALLS_MISSING] = self.wanted[slots] - above
         some = np.maximum(above, 1)[:, None]
-        state[slots, 12:14] = (local[:, :, :2] * over[:, :, None]).sum(axis=1) / some
-        state[slots, 14] = (local[:, :, 2] * over).max(axis=1)
+        state[slots, CENTRE] = (local[:, :, :2] * over[:, :, None]).sum(axis=1) / some
+        state[slots, HIGHEST_BALL] = (local[:, :, 2] * over).max(axis=1)
         raised = np.clip(1.0 - way / (LINE - FLOOR_CLEARANCE), 0.0, 1.0)
         return above, held, clear, raised
 
@@ -498,15 +521,18 @@ def pour(design: Floats, count: int, rng: np.random.Generator) -> Floats:
     """Return (count, 3) places above the tool `design` (D,) at its start, in layers, clear of it and of each other."""
     pitch = 2.0 * BALL_RADIUS + POUR_GAP
     layer, row, column = np.unravel_index(np.arange(count), (BALLS, POUR_COLUMNS, POUR_COLUMNS))
-    angles, heights = design[6:], design[2:6]
-    back = -0.5 * design[1] + max(0.0, -np.sin(angles[0]) * heights[0]) + BALL_RADIUS + 0.5 * POUR_GAP
+    angles, heights = design[ANGLES], design[HEIGHTS]
+    # The first row clears the back plate, which stands on the plate's rear edge and may lean inwards, over the opening.
+    inwards = max(0.0, -np.sin(angles[BACK]) * heights[BACK])
+    back = -0.5 * design[BOTTOM_LENGTH] + inwards + BALL_RADIUS + 0.5 * POUR_GAP
     first = max(back, -pitch)
     jitter = rng.uniform(-0.45, 0.45, size=(count, 2)) * POUR_GAP
     shift = rng.uniform((-0.02, 0.0), (0.02, 0.015))
     top = (heights * np.cos(angles)).max() - HALF_THICKNESS
     x = (column - 0.5 * (POUR_COLUMNS - 1)) * pitch + jitter[:, 0] + shift[0]
     y = first + row * pitch + jitter[:, 1] + shift[1]
-    lowest = max(top + BALL_RADIUS + 2.0 * HALF_THICKNESS, BALL_RADIUS + pitch - TOOL_START[2])  # Above balls outside.
+    # The lowest layer is above the tool's rim and above the balls that lie outside of it.
+    lowest = max(top + BALL_RADIUS + 2.0 * HALF_THICKNESS, BALL_RADIUS + pitch - TOOL_START[2])
     z = lowest + layer * pitch
     return TOOL_START + np.stack([x, y, z], axis=1)
 
@@ -514,14 +540,15 @@ def pour(design: Floats, count: int, rng: np.random.Generator) -> Floats:
 def scoop_boxes(designs: Floats) -> Boxes:
     """Return the boxes of tools (b, D) in their own frame: handle, back, bottom, front, left and right plates."""
     count = len(designs)
-    half, heights, angles = 0.5 * designs[:, :2], 0.5 * designs[:, 2:6], designs[:, 6:]
+    half, heights, angles = 0.5 * designs[:, BOTTOM], 0.5 * designs[:, HEIGHTS], designs[:, ANGLES]
     sizes = np.zeros((count, 6, 3))
     centres, rotations = np.zeros((count, 6, 3)), np.zeros((count, 6, 4))
     rotations[:, 2, 3] = 1.0
     sizes[:, 2] = np.stack([*half.T, np.full(count, HALF_THICKNESS)], axis=1)
-    for side, node in enumerate((1, 3, 4, 5)):
+    for side, node in enumerate(SIDE_NODES):
         axis = int(np.argmax(np.abs(OUTWARDS[side])))
         height, angle = heights[:, side], angles[:, side]
+        # The plate's inner face meets the bottom's edge, flush with its underside, and turns outwards about there.
         out = half[:, axis] + HALF_THICKNESS * np.cos(angle) + height * np.sin(angle)
         centres[:, node, axis] = OUTWARDS[side, axis] * out
         centres[:, node, 2] = height * np.cos(angle) - HALF_THICKNESS * (1.0 + np.sin(angle))
@@ -530,10 +557,12 @@ def scoop_boxes(designs: Floats) -> Boxes:
         sizes[:, node, 2] = height
         sign = OUTWARDS[side, axis] * (1.0 if axis == 0 else -1.0)
         rotations[:, node] = rotations_about(1 - axis, sign * angle)
-    lean = angles[:, 0] + HANDLE_LEAN
+    # The handle goes on from the top of the back plate and leans further back.
+    angle, height = angles[:, BACK], heights[:, BACK]
+    lean = angle + HANDLE_LEAN
     sizes[:, 0] = HANDLE_HALF_EXTENTS
-    out = half[:, 1] + HALF_THICKNESS * np.cos(angles[:, 0]) + 2.0 * heights[:, 0] * np.sin(angles[:, 0])
-    up = 2.0 * heights[:, 0] * np.cos(angles[:, 0]) - HALF_THICKNESS * (1.0 + np.sin(angles[:, 0]))
+    out = half[:, 1] + HALF_THICKNESS * np.cos(angle) + 2.0 * height * np.sin(angle)
+    up = 2.0 * height * np.cos(angle) - HALF_THICKNESS * (1.0 + np.sin(angle))
     centres[:, 0, 1] = -out - HANDLE_HALF_EXTENTS[2] * np.sin(lean)
     centres[:, 0, 2] = up + HANDLE_HALF_EXTENTS[2] * np.cos(lean)
     rotations[:, 0] = rotations_about(0, lean)
@@ -542,8 +571,8 @@ def scoop_boxes(designs: Floats) -> Boxes:
 
 def beyond_sides(designs: Floats, points: Floats) -> Floats:
     """Return how far `points` (b, n, 3), in the frame of tools (b, D), lie outside each inner face: (b, n, P)."""
-    half = 0.5 * designs[:, [1, 1, 0, 0]][:, None]
-    angles = designs[:, None, 6:]
+    half = 0.5 * designs[:, [BOTTOM_LENGTH, BOTTOM_LENGTH, BOTTOM_WIDTH, BOTTOM_WIDTH]][:, None]
+    angles = designs[:, None, ANGLES]
     out = points[..., :2] @ OUTWARDS.T - half
     result: Floats = out * np.cos(angles) - (points[..., 2:] + HALF_THICKNESS) * np.sin(angles)
     return result
@@ -571,7 +600,7 @@ def turn_matrices(turns: Floats) -> Floats:
 
 def drop(designs: Floats, matrices: Floats) -> Floats:
     """Return how far the lowest point of the bottom plates lies below their middle, (b,), m."""
-    half = np.column_stack([0.5 * designs[:, :2], np.full(len(designs), HALF_THICKNESS)])
+    half = np.column_stack([0.5 * designs[:, BOTTOM], np.full(len(designs), HALF_THICKNESS)])
     result: Floats = (np.abs(matrices[:, 2]) * half).sum(axis=1)
     return result
 
@@ -584,41 +613,7 @@ def closeness(count: Floats, wanted: Slots) -> Floats:
 
 
 def _area(designs: Floats) -> Floats:
-    width, length = designs[:, 0], designs[:, 1]
-    back, front, left, right = designs[:, 2:6].T
+    width, length = designs[:, BOTTOM].T
+    back, front, left, right = designs[:, HEIGHTS].T
     result: Floats = width * length + width * (back + front) + length * (left + right)
     return result
-
-
-class _Script(Behaviour):
-    """A tool for each number of balls, lifted straight up and held still."""
-
-    TOOLS: ClassVar[tuple[tuple[float, ...], ...]] = (
-        (-0.9, -0.9, -0.3, -0.4, -0.8, -0.7, -0.3, 0.3, -0.3, -0.2),  # 1: the smallest plate
-        (0.2, -0.9, -0.1, -0.2, -0.5, -0.6, -0.2, 0.6, -0.2, -0.3),  # 2: wider than long
-        (0.8, -1.0, -0.1, -0.7, -0.1, -0.3, 0.6, 0.9, 0.7, 0.6),  # 3: wide, short and open
-        (0.4, 0.5, -0.7, -0.7, -0.7, -0.7, -0.2, -0.2, -0.2, -0.2),  # 4: square and low
-        (0.9, 0.1, -0.2, -0.9, -0.1, 0.1, -0.5, 0.4, -0.2, -0.2),  # 5: wide, low in front
-        (0.9, 0.5, -0.1, -0.2, -0.2, -0.2, 0.5, 0.4, 0.1, 0.1),  # 6: large
-        (1.0, 0.4, 0.2, -0.2, -0.6, -0.4, 0.6, 0.8, 0.9, -0.5),  # 7: large and open
-    )
-    """Normalised designs for 1 to 7 balls, found by a small search over tools lifted straight up."""
-    SPARE_HEIGHT = 0.03
-    """The tool is lifted this far above the line, m."""
-
-    def __init__(self, task: Scoop3D) -> None:
-        self.task = task
-
-    def design(self, observation: Singles) -> Singles:
-        """Return the tool for the number of balls wanted."""
-        wanted = np.rint(observation[..., self.task.layout.goal][..., 0]).astype(np.intp)
-        tools: Singles = np.array(self.TOOLS, dtype=np.float32)[wanted - WANTED[0]]
-        return tools
-
-    def act(self, observation: Singles) -> Singles:
-        """Return the control that lifts the tool and keeps it level."""
-        largest = self.task.control_space.bounds[1]
-        control = np.zeros((*observation.shape[:-1], self.task.control_space.size), dtype=np.float32)
-        control[..., 2] = (observation[..., 6] + self.SPARE_HEIGHT) / largest[2]
-        control[..., 3:] = -observation[..., 3:6] / largest[3:]
-        return np.clip(control, -1.0, 1.0)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import re
 from dataclasses import dataclass, field
+from importlib import import_module
 from itertools import product
 from typing import Any
 
@@ -21,9 +22,11 @@ from codesign_bench.task import Behaviour, Floats, Singles, load_task
 from codesign_bench.task.episodes import Episodes
 
 catch: Any = load_module("tasks", "catch_balls")
+script: Any = import_module("codesign_bench.tasks._scripts.catch_balls")
 SLOT = np.array([0])
 IDLE = np.zeros((1, 1))
-RIGHT, LEFT = (np.array([[*catch._Script.PAN[:3], side, side]]) for side in (1.0, -1.0))
+PAN = np.array([script.CatchBallsScript.PAN])
+RIGHT, LEFT = PAN, PAN * script.CatchBallsScript.MIRROR
 """The script's pans, normalised."""
 HANGING = np.array([[1.0, 1.0, 1.0, 0.0, 0.0]])
 """The longest tool, straight down."""
@@ -112,7 +115,7 @@ def test_a_throw_by_hand() -> None:
     starts, speeds = catch.throws(instance)
     np.testing.assert_allclose(starts[0, :, 0], [23.5 - 2.0 * 2.0**0.5, 23.0, 23.0 + 2.0 * 2.0**0.5])
     np.testing.assert_allclose(starts[0, :, 1], 18.0)
-    np.testing.assert_allclose(speeds, [[2.0, 0.0, -2.0]])
+    np.testing.assert_allclose(speeds, [[[2.0, 0.0], [0.0, 0.0], [-2.0, 0.0]]])
 
 
 def test_thrown_balls_reach_the_hands_height_where_the_instance_says() -> None:
@@ -133,7 +136,7 @@ def test_thrown_balls_reach_the_hands_height_where_the_instance_says() -> None:
         share = (before[..., 1] - catch.HAND_START[1]) / (before[..., 1] - after[..., 1])
         crossed = (share >= 0.0) & (share < 1.0)
         seen[crossed] = (before[..., 0] + share * (after[..., 0] - before[..., 0]))[crossed]
-    np.testing.assert_allclose(seen, instances[:, :1] + instances[:, 1:4], atol=0.1)
+    np.testing.assert_allclose(seen, instances[:, catch.LANDING, None] + instances[:, catch.OFFSETS], atol=0.1)
 
 
 def tool_of(space: pymunk.Space) -> pymunk.Body:
@@ -235,10 +238,10 @@ def test_the_hand_keeps_to_its_speed_and_acceleration() -> None:
 
 def test_balls_come_down_left_and_right_of_the_hand_equally_often_and_never_near_it() -> None:
     instances = load_task("catch_balls").sample_instances(np.random.default_rng(0), 20_000)
-    distance = np.abs(instances[:, 0] - catch.HAND_START[0])
+    distance = np.abs(instances[:, catch.LANDING] - catch.HAND_START[0])
     near, far = catch.LANDING_DISTANCE
     assert near <= distance.min() <= distance.max() <= far
-    assert (instances[:, 0] > catch.HAND_START[0]).mean() == pytest.approx(0.5, abs=0.015)
+    assert (instances[:, catch.LANDING] > catch.HAND_START[0]).mean() == pytest.approx(0.5, abs=0.015)
     assert (distance < 0.5 * (near + far)).mean() == pytest.approx(0.5, abs=0.015)
 
 
@@ -262,7 +265,7 @@ def test_the_script_solves_nearly_all_goals_and_with_one_pan_hardly_more_than_on
     assert evaluate(task, task.script(), instances=instances).successes.mean() > 0.95
     for tool, side in ((RIGHT, 1.0), (LEFT, -1.0)):
         solved = evaluate(task, _OneTool(tool), instances=instances).successes
-        own = np.sign(instances[:, 0] - catch.HAND_START[0]) == side
+        own = np.sign(instances[:, catch.LANDING] - catch.HAND_START[0]) == side
         assert solved[own].mean() > 0.9
         assert solved[~own].mean() < 0.1
 

@@ -93,8 +93,10 @@ def stay(observation: Floats) -> Floats:
 
 def push_left(observation: Floats) -> Floats:
     """Bring the tip of a straight tool to the right of the puck, push left, and stop near the goal."""
-    puck, base, to_goal = observation[0:2], observation[4:6], observation[6:8]
-    length = load_task("push").design_space.from_unit(STRAIGHT)[0, :3].sum()
+    task = load_task("push")
+    state = task.layout.split(observation).state
+    puck, base, to_goal = state[push.PUCK], state[push.BASE], state[push.PUCK_TO_GOAL]
+    length = task.design_space.from_unit(STRAIGHT)[0, task.design_space.group("link_")].sum()
     behind = puck + np.array([REACH + length + 0.2, 0.0])
     aligned = abs(base[1] - puck[1]) < 0.05
     if not aligned:  # First to the right, where the tool is clear of the puck, then to the puck's height.
@@ -194,8 +196,9 @@ def test_the_simulator_starts_tools_where_the_geometry_says() -> None:
     episodes.begin(slots, np.tile(goal_at(push.GOAL_DISTANCE[0], 0.0), (len(designs), 1)))
     episodes.design(slots, task.design_space.to_unit(designs))
     shifts = push.start_shift(push.chain_points(designs, push.FIRST_LINK_ANGLE))
-    np.testing.assert_allclose(episodes.observation[:, 4], push.TOOL_START[0] + shifts, atol=1e-5)
-    np.testing.assert_allclose(episodes.observation[:, 5], push.TOOL_START[1], atol=1e-5)
+    base = task.layout.split(episodes.observation).state[:, push.BASE]
+    np.testing.assert_allclose(base[:, 0], push.TOOL_START[0] + shifts, atol=1e-5)
+    np.testing.assert_allclose(base[:, 1], push.TOOL_START[1], atol=1e-5)
     for slot in slots:  # pymunk's own shapes leave the clearance, too.
         simulator: Any = episodes.simulator
         space: pymunk.Space = simulator.spaces[slot]

@@ -169,7 +169,7 @@ def test_piles_are_different_nearly_at_rest_and_inside_the_reservoir() -> None:
 def test_no_tool_starts_in_a_ball_and_no_ball_in_another() -> None:
     designs, rng = many_designs(64), np.random.default_rng(1)
     instances = load_task("scoop").sample_instances(rng, len(designs))
-    instances[:, 2] = scoop.START_SHIFT * rng.choice([-1.0, 1.0], size=len(designs))
+    instances[:, scoop.SHIFT] = scoop.START_SHIFT * rng.choice([-1.0, 1.0], size=len(designs))
     simulator: Any = started(instances, designs).simulator
     left, right = scoop.RESERVOIR
     for slot in range(len(designs)):
@@ -182,7 +182,7 @@ def test_no_tool_starts_in_a_ball_and_no_ball_in_another() -> None:
         assert balls[:, 0].max() <= right - scoop.BALL_RADIUS + 1e-6
         assert balls[:, 1].max() < scoop.LINE
         assert tool[:, 1].min() == pytest.approx(scoop.TOOL_START[1])
-        assert joint[0] == pytest.approx(scoop.TOOL_START[0] + instances[slot, 2])
+        assert joint[0] == pytest.approx(scoop.TOOL_START[0] + instances[slot, scoop.SHIFT])
         assert left + scoop.CLEARANCE - 1e-6 <= tool[:, 0].min()
         assert tool[:, 0].max() <= right - scoop.CLEARANCE + 1e-6
 
@@ -207,8 +207,8 @@ def test_tools_stay_in_their_place_whatever_is_asked() -> None:
             controls = rng.choice([-1.0, 1.0], size=(len(designs), 3))
         simulator.step(np.arange(len(designs)), controls)
         assert np.abs(simulator.hand_velocity).max() <= scoop.MAX_SPEED + 1e-6
-        points = scoop.rotated(simulator.chain, simulator.turn[:, 0]) + simulator.bodies[:, None, scoop.NUM_BALLS, :2]
-        assert np.abs(simulator.turn[:, 0]).max() <= 1.2 * scoop.MAX_TILT
+        points = scoop.rotated(simulator.chain, simulator.tilt) + simulator.bodies[:, None, scoop.NUM_BALLS, :2]
+        assert np.abs(simulator.tilt).max() <= 1.2 * scoop.MAX_TILT
         assert points[..., 1].min() >= scoop.FLOOR + 0.5 * scoop.CLEARANCE
         assert left + 0.5 * scoop.CLEARANCE <= points[..., 0].min()
         assert points[..., 0].max() <= right - 0.5 * scoop.CLEARANCE
@@ -313,7 +313,7 @@ def test_the_script_scoops_most_numbers_with_its_own_tools_and_few_with_one() ->
     wanted = np.repeat(np.arange(scoop.GOAL_NUMBERS[0], scoop.GOAL_NUMBERS[1] + 1), 6)
     rng = np.random.default_rng(3)
     instances = task.sample_instances(rng, len(wanted))
-    instances[:, 0] = wanted
+    instances[:, scoop.WANTED] = wanted
     script = task.script()
     own = evaluate(task, script, instances=instances)
     assert own.successes.mean() > 0.5

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import inspect
 import re
+from importlib import import_module
 from itertools import product
 from typing import Any
 
@@ -21,6 +22,7 @@ from codesign_bench.task.behaviours import GivenDesigns
 from codesign_bench.task.episodes import Episodes
 
 scoop: Any = load_module("tasks", "scoop_3d")
+script: Any = import_module("codesign_bench.tasks._scripts.scoop_3d")
 SLOT = np.array([0])
 LIFT = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
 SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
@@ -29,7 +31,7 @@ SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
 
 def tool_for(count: int) -> Floats:
     """Return the script's normalised tool (1, D) for a number of balls."""
-    return np.array([scoop._Script.TOOLS[count - 1]])
+    return np.array([script.Scoop3DScript.TOOLS[count - 1]])
 
 
 def started(wanted: int, design: Floats, pile: int = 3) -> Episodes:
@@ -42,9 +44,9 @@ def started(wanted: int, design: Floats, pile: int = 3) -> Episodes:
 
 def lift_to_the_end(episodes: Episodes) -> tuple[list[float], bool]:
     """Play the script's controller to the episode's end; return the rewards and whether it was cut by the limit."""
-    script, rewards = load_task("scoop_3d").script(), []
+    lifting, rewards = load_task("scoop_3d").script(), []
     while True:
-        reward, terminated, truncated = episodes.control(SLOT, script.act(episodes.observation).astype(np.float64))
+        reward, terminated, truncated = episodes.control(SLOT, lifting.act(episodes.observation).astype(np.float64))
         rewards.append(float(reward[0]))
         if terminated[0] or truncated[0]:
             return rewards, bool(truncated[0])
@@ -148,7 +150,7 @@ def test_the_lowest_point_of_a_tilted_plate_by_hand() -> None:
 
 
 def test_instances_are_whole_numbers_of_balls_all_alike() -> None:
-    wanted = load_task("scoop_3d").sample_instances(np.random.default_rng(0), 7_000)[:, 0]
+    wanted = load_task("scoop_3d").sample_instances(np.random.default_rng(0), 7_000)[:, scoop.BALLS_WANTED]
     counts = np.array([(wanted == number).sum() for number in range(scoop.WANTED[0], scoop.WANTED[1] + 1)])
     assert counts.sum() == 7_000
     assert np.abs(counts - 1_000).max() < 120  # Four standard deviations.
@@ -198,7 +200,7 @@ def test_the_right_number_held_for_long_enough_is_a_success() -> None:
     rewards, _ = lift_to_the_end(episodes)
     assert episodes.success(SLOT).all()
     assert episodes.simulator.outcome[0] == 5
-    assert episodes.simulator.state[0, 10] == 1.0
+    assert episodes.simulator.state[0, scoop.HELD_SHARE] == 1.0
     assert rewards[-1] > 0.9 * scoop.TABLE.success_reward
     assert max(rewards[:-1]) < 0.5 * scoop.TABLE.success_reward
 
@@ -215,7 +217,7 @@ def test_a_wrong_number_fails_after_a_while_above_the_line() -> None:
 
 def test_an_idle_tool_holds_nothing_however_full_it_is() -> None:
     episodes = started(6, tool_for(6))
-    assert episodes.observation[0, 7] >= 6
+    assert episodes.simulator.state[0, scoop.BALLS_ABOVE] >= 6
     for _ in range(scoop.HELD_STEPS + 2):
         reward, terminated, _ = episodes.control(SLOT, 0.0 * LIFT)
         assert not terminated[0]
@@ -235,7 +237,7 @@ def test_a_ball_that_flies_past_is_not_held() -> None:
     pybullet.resetBasePositionAndOrientation(ball, above, scoop.LEVEL, physicsClientId=world)
     pybullet.resetBaseVelocity(ball, [0.0, 0.0, 1.5], physicsClientId=world)
     episodes.control(SLOT, 0.0 * LIFT)
-    assert episodes.observation[0, 7] == 2, "above the tool"
+    assert simulator.state[0, scoop.BALLS_ABOVE] == 2, "above the tool"
     assert simulator.outcome[0] == 1, "but not held"
     assert simulator.held_steps[0] == 0
 
@@ -243,7 +245,7 @@ def test_a_ball_that_flies_past_is_not_held() -> None:
 def test_rewards_add_up_to_the_documented_potential() -> None:
     episodes = started(3, tool_for(6))
     rewards, _ = lift_to_the_end(episodes)
-    few, many = sorted((episodes.observation[0, 7] + 1.0, 4.0))
+    few, many = sorted((episodes.simulator.state[0, scoop.BALLS_ABOVE] + 1.0, 4.0))
     expected = scoop.PROGRESS_REWARD * (few / many) ** scoop.CLOSENESS_POWER + scoop.TABLE.slack_reward * len(rewards)
     assert sum(rewards) == pytest.approx(expected, abs=1e-6)
 

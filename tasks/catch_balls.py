@@ -5,6 +5,8 @@ Shapes: `b` slots a call names, `I` = 10 instance, `D` = 5 design, `C` = 1 contr
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 import pymunk
 
@@ -185,6 +187,14 @@ class CatchBalls(Task):
     instance_space = INSTANCE
     goal_size = 1
     state_space = STATE
+    reward_terms: ClassVar = {
+        "progress": f"(k_now - k_before) / {NUM_BALLS}, k the number of balls held",
+        "slack": f"{TABLE.slack_reward:g}",
+        "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
+    }
+    success_conditions: ClassVar = {"all_held": f"all {NUM_BALLS} balls are held"}
+    success_steps = HOLD_STEPS
+    failure_condition = "a ball has fallen below the tool, and every other one has, too, or is caught"
 
     outcome = Quantity("balls held", "balls")
     soundness = Soundness(
@@ -254,13 +264,12 @@ class _CatchSimulator(PlanarSimulator):
     def begin(self, slots: Slots, instances: Floats) -> None:
         """Put hands at their start and balls where the throws `instances` (b, I) begin."""
         starts, speeds = throws(instances)
+        self.forget(slots)
         self.landing[slots] = instances[:, LANDING]
         self.velocity[slots] = 0.0
         self.points[slots] = 0.0
         self.held[slots] = False
         self.held_steps[slots] = 0
-        self.reward[slots] = self.outcome[slots] = 0.0
-        self.success[slots] = self.failure[slots] = False
         self.bodies[slots, BALL_BODIES] = np.concatenate([starts, speeds], axis=2)
         self.bodies[slots, TOOL_BODY] = (*HAND_START, 0.0, 0.0)
         self._write_state(slots)
@@ -308,10 +317,14 @@ class _CatchSimulator(PlanarSimulator):
         caught = steps >= HOLD_STEPS
         lowest = hand[:, 1] + points[:, :, 1].min(axis=1)
         lost = balls[:, :, 1] < lowest[:, None]
-        success = caught.all(axis=1)
-        gained = held.sum(axis=1) - self.held[slots].sum(axis=1)
-        self.reward[slots] = gained / NUM_BALLS + TABLE.slack_reward + SUCCESS_REWARD * success
-        self.success[slots] = success
+        all_held: Booleans = np.all(held, axis=1)
+        self.set_success(slots, HOLD_STEPS, all_held=all_held)
+        self.set_reward(
+            slots,
+            progress=(held.sum(axis=1) - self.held[slots].sum(axis=1)) / NUM_BALLS,
+            slack=TABLE.slack_reward,
+            success=SUCCESS_REWARD * self.success[slots],
+        )
         self.failure[slots] = lost.any(axis=1) & (lost | caught).all(axis=1)
         self.outcome[slots] = held.sum(axis=1)
         self.held[slots], self.held_steps[slots] = held, steps

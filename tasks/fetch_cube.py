@@ -5,6 +5,8 @@ Shapes: `b` slots a call names, `I` = 2 instance (cube's start x, y), `D` = 11 d
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from codesign_bench.studies.corl2023.protocol import PROTOCOL
@@ -219,6 +221,12 @@ class FetchCube(Task):
     instance_space = INSTANCE
     goal_size = 2
     state_space = STATE
+    reward_terms: ClassVar = {
+        "progress": f"{PROGRESS_WEIGHT:g} (d_before - d_after), d the distance from cube to base, m",
+        "slack": f"{TABLE.slack_reward:g}",
+        "success": f"{TABLE.success_reward:g} in the step that solves the task",
+    }
+    success_conditions: ClassVar = {"at_base": f"the cube's centre is closer than {GOAL_DISTANCE:g} m to the base"}
 
     outcome = Quantity("distance from cube to base", "m")
     max_slots = MAX_SLOTS
@@ -317,11 +325,10 @@ class _FetchCubeSimulator(BulletSimulator):
 
     def begin(self, slots: Slots, instances: Floats) -> None:
         """Put cubes where `instances` (b, I) say and held points at their start."""
+        self.forget(slots)
         self.start[slots] = instances
         self.pose[slots] = HOLD_START
         self.points[slots] = 0.0
-        self.reward[slots] = 0.0
-        self.success[slots] = False
         self.restart(slots)
         self.distance[slots] = np.linalg.norm(instances, axis=1)
         self._write_state(slots)
@@ -367,11 +374,12 @@ class _FetchCubeSimulator(BulletSimulator):
         self.read_bodies(slots)
         before = self.distance[slots]
         self._write_state(slots)
-        self.success[slots] = self.distance[slots] < GOAL_DISTANCE
-        self.reward[slots] = (
-            PROGRESS_WEIGHT * (before - self.distance[slots])
-            + TABLE.slack_reward
-            + TABLE.success_reward * self.success[slots]
+        self.set_success(slots, at_base=self.distance[slots] < GOAL_DISTANCE)
+        self.set_reward(
+            slots,
+            progress=PROGRESS_WEIGHT * (before - self.distance[slots]),
+            slack=TABLE.slack_reward,
+            success=TABLE.success_reward * self.success[slots],
         )
 
     def mark(self, slot: int, marks: Marks) -> None:

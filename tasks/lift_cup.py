@@ -6,6 +6,8 @@ Shapes: `B` slots, `b` slots a call names, `I` = 2 instance (cup's width and hei
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
@@ -220,6 +222,18 @@ class LiftCup(Task):
     instance_space = INSTANCE
     goal_size = 2
     state_space = STATE
+    reward_terms: ClassVar = {
+        "progress": f"change of {LIFT_WEIGHT:g} h - {FIT_WEIGHT:g} d + f, h, d and f as below",
+        "slack": f"{TABLE.slack_reward:g}",
+        "success": f"{TABLE.success_reward:g} in the step that solves the task",
+    }
+    success_conditions: ClassVar = {
+        "lifted": f"the cup's lowest corner is higher than {SUCCESS_HEIGHT:g} m",
+        "upright": f"the cup's axis is within {np.rad2deg(np.arccos(UPRIGHT)):.0f} degrees of the vertical",
+    }
+    failure_condition = (
+        f"the cup is tipped by more than {np.rad2deg(np.arccos(TIPPED)):.0f} degrees, or has fallen off the table"
+    )
 
     outcome = Quantity("height of the cup's lowest corner while upright", "m")
     max_slots = MAX_SLOTS
@@ -375,6 +389,7 @@ class _LiftCupSimulator(BulletSimulator):
 
     def begin(self, slots: Slots, instances: Floats) -> None:
         """Put cups of the sizes that `instances` (b, I) say on their tables."""
+        self.forget(slots)
         size = CUP_UNIT * instances
         cups = _Cups(*size.T)
         self.size[slots] = size
@@ -386,8 +401,6 @@ class _LiftCupSimulator(BulletSimulator):
         self._cups.update(zip(slots.tolist(), zip(*parts, strict=True), strict=True))
         self.restart(slots)
         self.potential[slots] = START_POTENTIAL
-        self.reward[slots] = self.outcome[slots] = 0.0
-        self.success[slots] = self.failure[slots] = False
         self.pose[slots] = TOOL_START
         self.state[slots] = 0.0
         self.state[slots, HELD] = TOOL_START
@@ -432,8 +445,11 @@ class _LiftCupSimulator(BulletSimulator):
         self.read_tools(slots)
         self.read_bodies(slots)
         potential = self._observe(slots)
-        self.reward[slots] = (
-            potential - self.potential[slots] + TABLE.slack_reward + TABLE.success_reward * self.success[slots]
+        self.set_reward(
+            slots,
+            progress=potential - self.potential[slots],
+            slack=TABLE.slack_reward,
+            success=TABLE.success_reward * self.success[slots],
         )
         self.potential[slots] = potential
 
@@ -453,7 +469,7 @@ class _LiftCupSimulator(BulletSimulator):
         upright = axes[:, 2] > UPRIGHT
         lifted = np.where(upright, np.maximum(lowest, 0.0), 0.0)
         self.outcome[slots] = lifted
-        self.success[slots] = lifted > SUCCESS_HEIGHT
+        self.set_success(slots, lifted=lowest > SUCCESS_HEIGHT, upright=upright)
         self.failure[slots] = (axes[:, 2] < TIPPED) | (place[:, 2] < FALLEN_HEIGHT)
 
         middle = held + self.prong_middle[slots]

@@ -5,6 +5,8 @@ Shapes: `b` slots a call names, `I` = 2 instance (goal x, y), `D` = 5 design, `C
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 import pymunk
 
@@ -159,6 +161,16 @@ class Push(Task):
     )
     goal_size = 2
     state_space = STATE
+    reward_terms: ClassVar = {
+        "progress": "(d_before - d_after) / d_start, d the distance from puck to goal, m",
+        "slack": f"{TABLE.slack_reward:g}",
+        "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
+    }
+    success_conditions: ClassVar = {
+        "at_goal": f"the puck's centre is within {GOAL_RADIUS:g} m of the goal",
+        "at_rest": f"the puck is slower than {REST_SPEED:g} m/s",
+    }
+    success_steps = REST_STEPS
 
     outcome = Quantity("distance from puck to goal", "m")
     # A puck between two links at once leaves up to a fifth faster than they move, until the contact solver has both.
@@ -219,17 +231,14 @@ class _PushSimulator(PlanarSimulator):
         self.goal = np.zeros((num_slots, 2))
         self.start_distance = np.ones(num_slots)
         self.distance = np.zeros(num_slots)
-        self.rest_steps = np.zeros(num_slots, dtype=np.intp)
         self.tools: list[pymunk.Body | None] = [None] * num_slots
 
     def begin(self, slots: Slots, instances: Floats) -> None:
         """Put pucks and held ends at their start and the goals where `instances` (b, I) say."""
+        self.forget(slots)
         self.goal[slots] = instances
         self.start_distance[slots] = np.linalg.norm(PUCK_START - instances, axis=1)
         self.distance[slots] = self.outcome[slots] = self.start_distance[slots]
-        self.rest_steps[slots] = 0
-        self.reward[slots] = 0.0
-        self.success[slots] = False
         self.bodies[slots, PUCK_BODY] = (*PUCK_START, 0.0, 0.0)
         self.bodies[slots, TOOL_BODY] = (*TOOL_START, 0.0, 0.0)
         self._write_state(slots)
@@ -271,11 +280,14 @@ class _PushSimulator(PlanarSimulator):
         self.advance(slots)
         puck = self.read_bodies(slots)[:, PUCK_BODY]
         distance = np.linalg.norm(puck[:, PLACE] - self.goal[slots], axis=1)
-        resting = (distance < GOAL_RADIUS) & (np.linalg.norm(puck[:, VELOCITY], axis=1) < REST_SPEED)
-        self.rest_steps[slots] = np.where(resting, self.rest_steps[slots] + 1, 0)
-        self.success[slots] = self.rest_steps[slots] >= REST_STEPS
-        progress = (self.distance[slots] - distance) / self.start_distance[slots]
-        self.reward[slots] = progress + TABLE.slack_reward + SUCCESS_REWARD * self.success[slots]
+        speed = np.linalg.norm(puck[:, VELOCITY], axis=1)
+        self.set_success(slots, REST_STEPS, at_goal=distance < GOAL_RADIUS, at_rest=speed < REST_SPEED)
+        self.set_reward(
+            slots,
+            progress=(self.distance[slots] - distance) / self.start_distance[slots],
+            slack=TABLE.slack_reward,
+            success=SUCCESS_REWARD * self.success[slots],
+        )
         self.distance[slots] = distance
         self.outcome[slots] = distance
         self._write_state(slots)

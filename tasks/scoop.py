@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 import pymunk
@@ -243,6 +244,19 @@ class Scoop(Task):
     instance_space = INSTANCE
     goal_size = 1
     state_space = STATE
+    reward_terms: ClassVar = {
+        "progress": f"change of h (min(1 + k, 1 + n) / max(1 + k, 1 + n))^{NUMBER_EXPONENT:g}, h the share of the way "
+        f"from y = {TOOL_START[1]:g} m to {CEILING:g} m by which the tool's lowest point has been lifted, k the number "
+        "of balls vertically above the tool, n the wanted number",
+        "slack": f"{TABLE.slack_reward:g}",
+        "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
+    }
+    success_conditions: ClassVar = {
+        "clear": f"the tool's lowest point is above y = {CLEAR:g} m, so that what rests on it is out of the reservoir",
+        "wanted_number": "as many balls as wanted are vertically above the tool",
+        "at_rest": f"all of them are slower than {REST_SPEED:g} m/s relative to the tool",
+    }
+    success_steps = HELD_STEPS
 
     outcome = Quantity("balls held out of the reservoir", "balls")
     soundness = Soundness(overlap=MAX_BALL_SPEED * CLOCK.period, speed=MAX_BALL_SPEED, outcome_change=0.3, chaotic=True)
@@ -293,7 +307,6 @@ class _ScoopSimulator(PlanarSimulator):
         """(B,) angle, rad, and angular velocity, rad/s, of the tools."""
         self.lowest = np.zeros(num_slots)
         """(B,) y of the tool's lowest point, m."""
-        self.held_steps = np.zeros(num_slots)
         self.hand_velocity = np.zeros((num_slots, 2))
         """(B, 2) of the hands in the last control step, m/s."""
         self.progress = np.zeros(num_slots)
@@ -303,6 +316,7 @@ class _ScoopSimulator(PlanarSimulator):
 
     def begin(self, slots: Slots, instances: Floats) -> None:
         """Put the piles of `instances` (b, I) into the reservoirs."""
+        self.forget(slots)
         wanted, pile = (np.rint(instances[:, entry]).astype(int) for entry in (WANTED, PILE))
         self.wanted[slots] = wanted
         self.bodies[slots] = 0.0
@@ -310,17 +324,8 @@ class _ScoopSimulator(PlanarSimulator):
         self.bodies[slots, TOOL_BODY, PLACE] = TOOL_START
         self.bodies[slots, TOOL_BODY, 0] += instances[:, SHIFT]
         self.chain[slots] = 0.0
-        for values in (
-            self.tilt,
-            self.spin,
-            self.hand_velocity,
-            self.outcome,
-            self.held_steps,
-            self.progress,
-            self.reward,
-        ):
+        for values in (self.tilt, self.spin, self.hand_velocity, self.progress):
             values[slots] = 0.0
-        self.success[slots] = False
         self.lowest[slots] = TOOL_START[1]
         self._write_state(slots, self.chain[slots])
 
@@ -374,9 +379,12 @@ class _ScoopSimulator(PlanarSimulator):
         self.spin[slots] = [tool.angular_velocity for tool in tools]
         before = self.progress[slots]
         self._look(slots)
-        self.success[slots] = self.held_steps[slots] >= HELD_STEPS
-        reward = self.progress[slots] - before + TABLE.slack_reward + SUCCESS_REWARD * self.success[slots]
-        self.reward[slots] = reward
+        self.set_reward(
+            slots,
+            progress=self.progress[slots] - before,
+            slack=TABLE.slack_reward,
+            success=SUCCESS_REWARD * self.success[slots],
+        )
 
     def inspect(self, slot: int) -> Physics:
         """Return the balls' deepest overlap, the speed of the fastest, and whether all are inside the outer walls."""
@@ -414,17 +422,18 @@ class _ScoopSimulator(PlanarSimulator):
         return velocity, turn
 
     def _look(self, slots: Slots) -> None:
-        """Count balls and measure progress; write the state."""
+        """Count balls, judge success and measure progress; write the state."""
         balls, tool = self.bodies[slots, BALL_BODIES], self.bodies[slots, TOOL_BODY]
         wanted, chain = self.wanted[slots], rotated(self.chain[slots], self.tilt[slots])
         self.lowest[slots] = lowest = tool[:, 1] + chain[..., 1].min(axis=1)
         from_tool = balls - tool[:, None]
         loaded = above(from_tool[..., PLACE], chain)
         number = loaded.sum(axis=1)
-        self.outcome[slots] = held = np.where(lowest > CLEAR, number, 0)
+        clear = lowest > CLEAR
+        self.outcome[slots] = np.where(clear, number, 0)
         moving = (from_tool[..., VELOCITY] ** 2).sum(axis=2) > REST_SPEED**2
-        right = (held == wanted) & ~(loaded & moving).any(axis=1)
-        self.held_steps[slots] = np.where(right, self.held_steps[slots] + 1.0, 0.0)
+        at_rest = ~(loaded & moving).any(axis=1)
+        self.set_success(slots, HELD_STEPS, clear=clear, wanted_number=number == wanted, at_rest=at_rest)
         lift = np.clip((lowest - TOOL_START[1]) / (CEILING - TOOL_START[1]), 0.0, 1.0)
         ratio = (1.0 + np.minimum(number, wanted)) / (1.0 + np.maximum(number, wanted))
         self.progress[slots] = lift * ratio**NUMBER_EXPONENT
@@ -437,7 +446,7 @@ class _ScoopSimulator(PlanarSimulator):
         state[:, TILT], state[:, ANGULAR_VELOCITY] = self.tilt[slots], self.spin[slots]
         state[:, LOWEST] = self.lowest[slots]
         state[:, HELD], state[:, HELD_LESS_WANTED] = self.outcome[slots], self.outcome[slots] - wanted
-        state[:, HELD_FOR] = self.held_steps[slots]
+        state[:, HELD_FOR] = self.met_steps[slots]
         state[:, SHAPE] = chain[:, 2:].reshape(len(slots), -1)
         state[:, WANTS] = wanted[:, None] == np.arange(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)
         self.state[slots] = state

@@ -6,6 +6,8 @@ Shapes: `b` slots a call names, `I` = 2 instance (balls wanted, pile), `D` = 10 
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 import pybullet
 
@@ -261,6 +263,21 @@ class Scoop3D(Task):
     instance_space = INSTANCE
     goal_size = 1
     state_space = STATE
+    reward_terms: ClassVar = {
+        "progress": f"change of {PROGRESS_REWARD:g} h (min(k + 1, n + 1) / max(k + 1, n + 1))^{CLOSENESS_POWER:g}, h "
+        "the share of the way from the start to the line by which the bottom plate's lowest point has been lifted, k "
+        "the number of balls in or above the tool, n the wanted number",
+        "slack": f"{TABLE.slack_reward:g}",
+        "success": f"{TABLE.success_reward:g} in the step that solves the task",
+    }
+    success_conditions: ClassVar = {
+        "clear": f"the bottom plate is nowhere lower than {LINE:g} m",
+        "wanted_number": "exactly the wanted number of balls is held",
+        "none_flying": "no other ball is above the tool",
+    }
+    success_steps = HELD_STEPS
+    failure_condition = f"the tool has been clear for {LOST_STEPS} control steps in all without success"
+
     outcome = Quantity("balls held above the line", "balls")
     max_slots = MAX_SLOTS
     # Balls that meet at up to 2.8 m/s overlap for a step of 1/120 s, also right after they were poured; tools start
@@ -323,18 +340,16 @@ class _ScoopSimulator(BulletSimulator):
         self.local = np.zeros((num_slots, BALLS, 3))
         """(B, N, 3) balls in the frame of the tool."""
         self.potential = np.zeros(num_slots)
-        self.held_steps = np.zeros(num_slots, dtype=np.intp)
         self.clear_steps = np.zeros(num_slots, dtype=np.intp)
 
     def begin(self, slots: Slots, instances: Floats) -> None:
         """Fill the reservoirs with the piles of `instances` (b, I)."""
+        self.forget(slots)
         self.wanted[slots] = np.rint(instances[:, BALLS_WANTED]).astype(np.intp)
         for slot, pile in zip(slots.tolist(), instances[:, PILE].tolist(), strict=True):
             self.piles[slot] = np.random.default_rng(round(pile))
         self.restart(slots)
-        for values in (self.potential, self.held_steps, self.clear_steps, self.reward, self.outcome):
-            values[slots] = 0
-        self.success[slots] = self.failure[slots] = False
+        self.potential[slots] = self.clear_steps[slots] = 0
         self.state[slots] = 0.0
         self.state[slots, TOOL_PLACE] = TOOL_START
         self.state[slots, BALLS_MISSING] = self.wanted[slots]
@@ -418,16 +433,19 @@ class _ScoopSimulator(BulletSimulator):
         self.advance(slots)
         above, held, clear, raised = self._observe(slots)
         self.clear_steps[slots] += clear
-        right = clear & (held == self.wanted[slots]) & (above == held)
-        self.held_steps[slots] = np.where(right, self.held_steps[slots] + 1, 0)
-        self.success[slots] = success = self.held_steps[slots] >= HELD_STEPS
-        self.failure[slots] = ~success & (self.clear_steps[slots] >= LOST_STEPS)
+        right = held == self.wanted[slots]
+        self.set_success(slots, HELD_STEPS, clear=clear, wanted_number=right, none_flying=above == held)
+        self.failure[slots] = ~self.success[slots] & (self.clear_steps[slots] >= LOST_STEPS)
         potential = PROGRESS_REWARD * raised * closeness(above, self.wanted[slots])
-        progress = potential - self.potential[slots]
-        self.reward[slots] = progress + TABLE.slack_reward + TABLE.success_reward * success
+        self.set_reward(
+            slots,
+            progress=potential - self.potential[slots],
+            slack=TABLE.slack_reward,
+            success=TABLE.success_reward * self.success[slots],
+        )
         self.potential[slots] = potential
         self.outcome[slots] = held
-        self.state[slots, HELD_SHARE] = self.held_steps[slots] / HELD_STEPS
+        self.state[slots, HELD_SHARE] = self.met_steps[slots] / HELD_STEPS
         self.state[slots, CLEAR_SHARE] = self.clear_steps[slots] / LOST_STEPS
 
     def inspect(self, slot: int) -> Physics:

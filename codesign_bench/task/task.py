@@ -7,6 +7,8 @@ A new task is one file in `tasks/` with one public subclass of `Task`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -21,6 +23,7 @@ from codesign_bench.task.tool import ToolGraph, ToolPart
 if TYPE_CHECKING:
     from codesign_bench.task.robot import DeployedSimulator, RobotTrials
 
+NOTHING_NAMED: Mapping[str, str] = MappingProxyType({})
 EVALUATION_SEED = 20231106
 """Seed of every task's fixed evaluation instances; training never uses it (ours)."""
 
@@ -47,6 +50,14 @@ class Task(ABC):
     goal_size: ClassVar[int]
     """How many leading entries of an instance are the goal."""
     state_space: ClassVar[Box]
+    reward_terms: ClassVar[Mapping[str, str]] = NOTHING_NAMED
+    """Name -> formula, with units, of each term that `Simulator.set_reward` adds up; empty: the task names none."""
+    success_conditions: ClassVar[Mapping[str, str]] = NOTHING_NAMED
+    """Name -> words, with units, for each condition of `Simulator.set_success`; empty: the task names none."""
+    success_steps: ClassVar[int] = 1
+    """Control steps in a row for which all of these conditions must hold."""
+    failure_condition: ClassVar[str] = ""
+    """When an episode is lost for good, in words with units; empty: never."""
     outcome: ClassVar[Quantity | None] = None
     """What `Simulator.outcome` measures: how far the task got, whatever the reward."""
     soundness: ClassVar[Soundness | None] = None

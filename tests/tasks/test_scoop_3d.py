@@ -239,7 +239,7 @@ def test_a_ball_that_flies_past_is_not_held() -> None:
     episodes.control(SLOT, 0.0 * LIFT)
     assert simulator.state[0, scoop.BALLS_ABOVE] == 2, "above the tool"
     assert simulator.outcome[0] == 1, "but not held"
-    assert simulator.held_steps[0] == 0
+    assert simulator.met_steps[0] == 0
 
 
 def test_rewards_add_up_to_the_documented_potential() -> None:

@@ -186,6 +186,7 @@ class CatchBalls(Task):
     control_space = Box.of(velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"))
     instance_space = INSTANCE
     goal_size = 1
+    position_entries = ("landing_x",)
     state_space = STATE
     reward_terms: ClassVar = {
         "progress": f"(k_now - k_before) / {NUM_BALLS}, k the number of balls held",
@@ -209,6 +210,13 @@ class CatchBalls(Task):
         distance = rng.uniform(*LANDING_DISTANCE, size=count)
         instances[:, LANDING] = HAND_START[0] + distance * np.where(rng.random(count) < 0.5, -1.0, 1.0)
         return instances
+
+    def in_region(self, instances: Floats) -> Booleans:
+        """Return which goals (b, I) are at a distance from the hand at which balls come down."""
+        near, far = LANDING_DISTANCE
+        distance = np.abs(instances[:, LANDING] - HAND_START[0])
+        inside: Booleans = (near <= distance) & (distance <= far)
+        return inside
 
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
         """Tell which goals (b, I) lie in the middle `fraction` of the places on the left or of those on the right.

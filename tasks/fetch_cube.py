@@ -220,6 +220,7 @@ class FetchCube(Task):
     control_space = CONTROL
     instance_space = INSTANCE
     goal_size = 2
+    position_entries = ("cube_start_x", "cube_start_y")
     state_space = STATE
     reward_terms: ClassVar = {
         "progress": f"{PROGRESS_WEIGHT:g} (d_before - d_after), d the distance from cube to base, m",

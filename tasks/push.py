@@ -160,6 +160,7 @@ class Push(Task):
         goal_y=(PUCK_START[1] - GOAL_DISTANCE[1], PUCK_START[1] + GOAL_DISTANCE[1], "m"),
     )
     goal_size = 2
+    position_entries = ("goal_x", "goal_y")
     state_space = STATE
     reward_terms: ClassVar = {
         "progress": "(d_before - d_after) / d_start, d the distance from puck to goal, m",
@@ -182,6 +183,13 @@ class Push(Task):
         distance = np.sqrt(rng.uniform(near**2, far**2, size=count))
         angle = rng.uniform(-np.pi, np.pi, size=count)
         return PUCK_START + distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+    def in_region(self, instances: Floats) -> Booleans:
+        """Return which goals (b, I) are in the ring around the puck."""
+        near, far = GOAL_DISTANCE
+        distance = np.linalg.norm(instances - PUCK_START, axis=1)
+        inside: Booleans = (near <= distance) & (distance <= far)
+        return inside
 
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
         """Tell which goals (b, I) lie in the two patches, above and below the puck, that cover `fraction` of the ring.

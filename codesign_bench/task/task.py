@@ -49,6 +49,11 @@ class Task(ABC):
     """All that differs between episodes: first the goal, then whatever the policies are not told as a goal."""
     goal_size: ClassVar[int]
     """How many leading entries of an instance are the goal."""
+    position_entries: ClassVar[tuple[str, ...]] = ()
+    """Names of the one or two entries of an instance that are a position, along x and y; empty: none is.
+
+    These are what a cutout region is cut out of, and what maps of instances show.
+    """
     state_space: ClassVar[Box]
     reward_terms: ClassVar[Mapping[str, str]] = NOTHING_NAMED
     """Name -> formula, with units, of each term that `Simulator.set_reward` adds up; empty: the task names none."""
@@ -84,8 +89,32 @@ class Task(ABC):
         """Return the (num_evaluation_instances, I) instances on which every method is judged, always the same."""
         return self.sample_instances(generator(EVALUATION_SEED, self.name), self.num_evaluation_instances)
 
+    @property
+    def position_index(self) -> list[int]:
+        """Where an instance holds its position, in the order of `position_entries`.
+
+        Raises:
+            UserError: no entry is a position.
+        """
+        if not self.position_entries:
+            raise UserError(f"neither goals nor starts of task '{self.name}' are positions")
+        return [self.instance_space.index(name) for name in self.position_entries]
+
+    def in_region(self, instances: Floats) -> Booleans:
+        """Return which positions of instances (b, I) are in the training region, its border included.
+
+        By default the region is what lies between the bounds of `position_entries`.
+
+        Raises:
+            UserError: no entry is a position.
+        """
+        index = self.position_index
+        low, high = (bound[index] for bound in self.instance_space.bounds)
+        inside: Booleans = np.all((low <= instances[:, index]) & (instances[:, index] <= high), axis=1)
+        return inside
+
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
-        """Tell which instances (b, I) lie in the cutout region, `fraction` of the training region (section 5.2).
+        """Return which instances (b, I) are in the cutout region, `fraction` of the training region (section 5.2).
 
         Raises:
             UserError: the task has no goal or start that is a position.

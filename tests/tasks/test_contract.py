@@ -37,9 +37,7 @@ def task(request: pytest.FixtureRequest) -> Task:
 @pytest.fixture
 def cutout_task(task: Task) -> Task:
     """Every task that has a cutout region."""
-    try:
-        task.in_cutout(task.evaluation_instances(), 0.5)
-    except UserError:
+    if not task.position_entries:
         pytest.skip("no goal or start of this task is a position")
     return task
 
@@ -197,6 +195,28 @@ def test_extreme_actions_act_like_the_bounds(task: Task) -> None:
     wild = Script(script.instances, 100.0 * script.designs, 100.0 * script.controls)
     tame = Script(script.instances, np.clip(wild.designs, -1.0, 1.0), np.clip(wild.controls, -1.0, 1.0))
     assert_equal(play(Episodes(task, EPISODES), wild, slots), play(Episodes(task, EPISODES), tame, slots))
+
+
+def test_a_task_has_a_region_and_a_cutout_if_and_only_if_it_names_a_position(task: Task) -> None:
+    instances = task.evaluation_instances()
+    if task.position_entries:
+        assert len(task.position_entries) <= 2
+        assert set(task.position_entries) <= set(task.instance_space.names)
+        assert task.in_region(task.sample_instances(np.random.default_rng(1), SAMPLES)).all()
+        assert not task.in_cutout(instances, 0.0).any()
+    else:
+        for refused in (lambda: task.in_region(instances), lambda: task.in_cutout(instances, 0.5)):
+            with pytest.raises(UserError, match=f"neither goals nor starts of task '{task.name}' are positions"):
+                refused()
+
+
+def test_the_region_ends_where_instances_do(cutout_task: Task) -> None:
+    low, high = cutout_task.instance_space.bounds
+    index, beyond = cutout_task.position_index, 1e-6 * (high - low)
+    for corner in (high + beyond, low - beyond):
+        outside = 0.5 * (low + high)
+        outside[index] = corner[index]
+        assert not cutout_task.in_region(outside[None])[0]
 
 
 @pytest.mark.parametrize("fraction", FRACTIONS)

@@ -1,4 +1,4 @@
-"""What tasks that can be deployed share: the arm by its name, and what its gripper holds."""
+"""What tasks that can be deployed share: the paper's trials, the arm by its name, and what its gripper holds."""
 
 from __future__ import annotations
 
@@ -8,6 +8,14 @@ from codesign_bench.task.robot import ARMS, IDEAL
 
 from ._carriers import Carrier
 from ._scene import Clock
+
+TRIALS_PER_TOOL = 5
+"""Trials of each tool on its own instance (paper, section "Evaluation on a real robot")."""
+TRIAL_STEPS = 100
+"""Control steps until a trial ends without success (paper, appendix "Real Robot Experiment Details")."""
+NEAR_MISS = 0.05
+"""A cube that ends so near to success counts as nearly fetched, m (paper, caption of the grid's results); a cup so far
+below the height of success counts as nearly lifted (ours)."""
 
 
 def arm_carrier(arm: str, base: tuple[float, float, float], clock: Clock) -> Carrier | None:

@@ -25,7 +25,7 @@ from codesign_bench.task import (
     ToolGraph,
     ToolPart,
 )
-from codesign_bench.task.robot import DeployedSimulator, RobotTrials
+from codesign_bench.task.robot import DeployedSimulator, DeploymentSpec, RobotTrials
 
 from ._bullet import (
     MAX_SLOTS,
@@ -40,7 +40,7 @@ from ._bullet import (
     rotations_about,
 )
 from ._carriers import Carrier
-from ._deployed import arm_carrier, gripper_handle
+from ._deployed import NEAR_MISS, TRIAL_STEPS, TRIALS_PER_TOOL, arm_carrier, gripper_handle
 from ._scene import COLOURS, Clock, nearest_clear_shift
 
 TABLE = BOX_SCENES["fetch_cube"]
@@ -267,10 +267,6 @@ class FetchCube(Task):
         """Return the links of the tool of a design (D,) in its units."""
         return box_parts(chain_boxes(design[None])[1])
 
-    def gripper_handle(self) -> tuple[ToolPart, ...]:
-        """Return the bar and the post that the arm's fingers hold."""
-        return gripper_handle()
-
     def script(self) -> Behaviour:
         """Return a script that pulls the cube with whichever side of a link it can bring behind it."""
         from ._scripts.fetch_cube import FetchCubeScript  # here, since that file reads this one
@@ -281,27 +277,41 @@ class FetchCube(Task):
         """Return a simulator of `num_slots` cubes and tools."""
         return _FetchCubeSimulator(num_slots, self.state_space.size, CLOCK.refined(refinement))
 
-    def robot_trials(self) -> RobotTrials:
-        """Return the four starts of the paper's tools and its 3 x 4 grid, in our frame.
+    @property
+    def deployment(self) -> DeploymentSpec:
+        """The paper's trials on a real robot, on a simulated arm."""
+        return DeploymentSpec(_robot_trials(), _on_an_arm, gripper_handle)
 
-        The real robot's frame is turned by half a turn about the vertical, (x, y) -> (-x, -y): that makes y point away
-        from the base and keeps left and right apart, as a mirror would not. The paper does not say where its grid lies:
-        ours is centred on the region of starts, (0, 0.65) m, so that the row nearest to the robot passes the start of
-        tool 2; at both sides it reaches 3 cm beyond the region.
-        """
-        own = -np.array(REAL_ROBOT.fetch_cube_starts)[:, :2]
-        depth, width = REAL_ROBOT.grid_extent
-        rows, columns = REAL_ROBOT.grid_shape
-        y = 0.5 * sum(CUBE_Y) + np.linspace(0.5 * depth, -0.5 * depth, rows)
-        x = 0.5 * sum(CUBE_X) + np.linspace(-0.5 * width, 0.5 * width, columns)
-        return RobotTrials(own, np.stack(np.meshgrid(x, y), axis=-1), GOAL_DISTANCE)
 
-    def make_deployed_simulator(self, num_slots: int, arm: str) -> DeployedSimulator:
-        """Return a simulator of `num_slots` cubes whose tools are held by `arm`, seen from the side."""
-        carrier = arm_carrier(arm, ARM_BASE, CLOCK)
-        simulator = _FetchCubeSimulator(num_slots, self.state_space.size, CLOCK, carrier)
-        simulator.camera, simulator.roofless = ARM_CAMERA, True
-        return simulator
+def _robot_trials() -> RobotTrials:
+    """Return the four starts of the paper's tools and its 3 x 4 grid, in our frame.
+
+    The real robot's frame is turned by half a turn about the vertical, (x, y) -> (-x, -y): that makes y point away from
+    the base and keeps left and right apart, as a mirror would not. The paper does not say where its grid is: ours is
+    centred on the region of starts, so that the row nearest to the robot passes the start of tool 2; at both sides it
+    reaches 3 cm beyond the region.
+    """
+    own = -np.array(REAL_ROBOT.fetch_cube_starts)[:, XY]
+    depth, width = REAL_ROBOT.grid_extent
+    rows, columns = REAL_ROBOT.grid_shape
+    y = 0.5 * sum(CUBE_Y) + np.linspace(0.5 * depth, -0.5 * depth, rows)
+    x = 0.5 * sum(CUBE_X) + np.linspace(-0.5 * width, 0.5 * width, columns)
+    return RobotTrials(
+        own,
+        np.stack(np.meshgrid(x, y), axis=-1),
+        success_outcome=GOAL_DISTANCE,
+        near_miss=NEAR_MISS,
+        trials_per_tool=TRIALS_PER_TOOL,
+        max_steps=TRIAL_STEPS,
+    )
+
+
+def _on_an_arm(num_slots: int, arm: str) -> DeployedSimulator:
+    """Return a simulator of `num_slots` cubes whose tools are held by `arm`, seen from the side."""
+    carrier = arm_carrier(arm, ARM_BASE, CLOCK)
+    simulator = _FetchCubeSimulator(num_slots, STATE.size, CLOCK, carrier)
+    simulator.camera, simulator.roofless = ARM_CAMERA, True
+    return simulator
 
 
 class _FetchCubeSimulator(BulletSimulator):

@@ -24,7 +24,7 @@ from codesign_bench.task import (
     ToolGraph,
     ToolPart,
 )
-from codesign_bench.task.robot import DeployedSimulator, RobotTrials
+from codesign_bench.task.robot import DeployedSimulator, DeploymentSpec, RobotTrials
 
 from ._bullet import (
     MAX_SLOTS,
@@ -40,7 +40,7 @@ from ._bullet import (
     rotations_about,
 )
 from ._carriers import Carrier
-from ._deployed import arm_carrier, gripper_handle
+from ._deployed import NEAR_MISS, TRIAL_STEPS, TRIALS_PER_TOOL, arm_carrier, gripper_handle
 from ._scene import COLOURS, Clock
 
 TABLE = BOX_SCENES["lift_cup"]
@@ -253,10 +253,6 @@ class LiftCup(Task):
         """Return the handle, cross bar and prongs of the tool of a design (D,) in its units."""
         return box_parts(fork_boxes(design[None]))
 
-    def gripper_handle(self) -> tuple[ToolPart, ...]:
-        """Return the bar and the post that the arm's fingers hold."""
-        return gripper_handle()
-
     def script(self) -> Behaviour:
         """Return a script that puts the prongs beside the cup and lifts."""
         from ._scripts.lift_cup import LiftCupScript  # here, since that file reads this one
@@ -267,16 +263,30 @@ class LiftCup(Task):
         """Return a simulator of `num_slots` cups and forks."""
         return _LiftCupSimulator(num_slots, self.state_space.size, CLOCK.refined(refinement))
 
-    def robot_trials(self) -> RobotTrials:
-        """Return the four cups of the paper's tools; there is no grid."""
-        return RobotTrials(np.array(REAL_ROBOT.lift_cup_sizes), np.zeros((0, 0, 2)), SUCCESS_HEIGHT)
+    @property
+    def deployment(self) -> DeploymentSpec:
+        """The paper's trials on a real robot, on a simulated arm."""
+        return DeploymentSpec(_robot_trials(), _on_an_arm, gripper_handle)
 
-    def make_deployed_simulator(self, num_slots: int, arm: str) -> DeployedSimulator:
-        """Return a simulator of `num_slots` cups whose forks are held by `arm`, seen from the side."""
-        carrier = arm_carrier(arm, ARM_BASE, CLOCK)
-        simulator = _LiftCupSimulator(num_slots, self.state_space.size, CLOCK, carrier)
-        simulator.camera = ARM_CAMERA
-        return simulator
+
+def _robot_trials() -> RobotTrials:
+    """Return the four cups of the paper's tools; there is no grid."""
+    return RobotTrials(
+        own=np.array(REAL_ROBOT.lift_cup_sizes),
+        grid=np.zeros((0, 0, INSTANCE.size)),
+        success_outcome=SUCCESS_HEIGHT,
+        near_miss=NEAR_MISS,
+        trials_per_tool=TRIALS_PER_TOOL,
+        max_steps=TRIAL_STEPS,
+    )
+
+
+def _on_an_arm(num_slots: int, arm: str) -> DeployedSimulator:
+    """Return a simulator of `num_slots` cups whose forks are held by `arm`, seen from the side."""
+    carrier = arm_carrier(arm, ARM_BASE, CLOCK)
+    simulator = _LiftCupSimulator(num_slots, STATE.size, CLOCK, carrier)
+    simulator.camera = ARM_CAMERA
+    return simulator
 
 
 def _volume(designs: Floats) -> Floats:

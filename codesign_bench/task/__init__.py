@@ -6,7 +6,7 @@ of it, `robot.py` what deployment on an arm asks of a task.
 """
 
 from codesign_bench.task.behaviour import Behaviour
-from codesign_bench.task.loading import deployable_tasks, load_task, task_names
+from codesign_bench.task.loading import deployable_tasks, deployment_of, load_task, task_names
 from codesign_bench.task.simulator import Physics, Simulator, Soundness
 from codesign_bench.task.spaces import Booleans, Box, Floats, Frame, Layout, Observed, Quantity, Singles, Slots, Span
 from codesign_bench.task.task import EVALUATION_SEED, Task
@@ -34,6 +34,7 @@ __all__ = [
     "ToolGraph",
     "ToolPart",
     "deployable_tasks",
+    "deployment_of",
     "load_task",
     "task_names",
 ]

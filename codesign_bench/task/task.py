@@ -9,19 +9,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from codesign_bench.errors import UserError
 from codesign_bench.seeding import generator
 from codesign_bench.task.behaviour import Behaviour
+from codesign_bench.task.robot import DeploymentSpec
 from codesign_bench.task.simulator import Simulator, Soundness
 from codesign_bench.task.spaces import Booleans, Box, Floats, Layout, Quantity
 from codesign_bench.task.tool import ToolGraph, ToolPart
-
-if TYPE_CHECKING:
-    from codesign_bench.task.robot import DeployedSimulator, RobotTrials
 
 NOTHING_NAMED: Mapping[str, str] = MappingProxyType({})
 EVALUATION_SEED = 20231106
@@ -148,14 +146,6 @@ class Task(ABC):
         """
         raise UserError(f"task '{self.name}' does not tell what its tools are made of")
 
-    def gripper_handle(self) -> tuple[ToolPart, ...]:
-        """Return what a robot's gripper holds a printed tool by, beyond `tool_parts`, in the frame of the held point.
-
-        The first part touches the tool's node 0, every other one the part before it. None by default: the task has no
-        gripper, or the tool has a handle of its own.
-        """
-        return ()
-
     def script(self) -> Behaviour:
         """Return a designer and a controller written by hand, for pictures and checks: functions of the observation.
 
@@ -176,18 +166,7 @@ class Task(ABC):
                 may leave this argument out).
         """
 
-    def make_deployed_simulator(self, num_slots: int, arm: str) -> DeployedSimulator:
-        """Return a simulator with `num_slots` slots whose tools are held by `arm`, one of `deployment.robot.ARMS`.
-
-        Raises:
-            UserError: the task has none.
-        """
-        raise UserError(f"task '{self.name}' cannot be deployed on an arm")
-
-    def robot_trials(self) -> RobotTrials:
-        """Return the instances of the paper's evaluation on a real robot.
-
-        Raises:
-            UserError: the task has none.
-        """
-        raise UserError(f"task '{self.name}' cannot be deployed on an arm")
+    @property
+    def deployment(self) -> DeploymentSpec | None:
+        """How policies and tools are tried on a robot arm; None: they cannot be."""
+        return None

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from codesign_bench.errors import unknown_name
-from codesign_bench.task import ToolPart
+from codesign_bench.task import Given, ToolPart, constants
 from codesign_bench.task.robot import ARMS, IDEAL
 
 from ._carriers import Carrier
 from ._scene import Clock
 
-TRIALS_PER_TOOL = 5
-"""Trials of each tool on its own instance (paper, section "Evaluation on a real robot")."""
-TRIAL_STEPS = 100
-"""Control steps until a trial ends without success (paper, appendix "Real Robot Experiment Details")."""
-NEAR_MISS = 0.05
-"""A cube that ends so near to success counts as nearly fetched, m (paper, caption of the grid's results); a cup so far
-below the height of success counts as nearly lifted (ours)."""
+REAL_ROBOT = 'paper, appendix "Real Robot Experiment Details"'
+TRIALS_PER_TOOL: Annotated[int, Given("trials", 'paper, section "Evaluation on a real robot"', "trials")] = 5
+"""With each tool on its own instance."""
+TRIAL_STEPS: Annotated[int, Given("control steps", REAL_ROBOT, "max_steps")] = 100
+"""Until a trial ends without success."""
+NEAR_MISS: Annotated[float, Given("m", "paper, figure of the grid of starts", "near_miss")] = 0.05
+"""A failure that ends this near to success counts as nearly solved; the paper counts so for the cube alone."""
+DEPLOYED_SCENE = constants(__name__)
+"""Constants of the tasks that can be deployed."""
 
 
 def arm_carrier(arm: str, base: tuple[float, float, float], clock: Clock) -> Carrier | None:

@@ -10,22 +10,36 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar, TypeAlias
+from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
 import pymunk
 from PIL import Image, ImageDraw
 from pymunk import batch
 
-from codesign_bench.task import Box, Floats, Frame, Physics, PlanarPart, Simulator, Slots, ToolGraph
+from codesign_bench.task import (
+    OURS,
+    Box,
+    Floats,
+    Frame,
+    Given,
+    Physics,
+    PlanarPart,
+    Simulator,
+    Slots,
+    ToolGraph,
+    constants,
+)
 
 from ._scene import COLOURS, PICTURE_PIXELS, Clock
 
 Point: TypeAlias = Sequence[float]
 """x and y, m."""
 
-LINK_HALF_WIDTH = 0.25
-"""Half the thickness of a link, m (ours)."""
+LINK_HALF_WIDTH: Annotated[float, Given("m", OURS)] = 0.25
+"""Half the thickness of a link."""
+CHAIN_SCENE = constants(__name__)
+"""Constants of the tasks that use the chain."""
 
 PLACE, VELOCITY = slice(0, 2), slice(2, 4)
 """Columns of `PlanarSimulator.bodies`: x and y (m); velocity along x and y (m/s)."""

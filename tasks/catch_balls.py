@@ -5,27 +5,30 @@ Shapes: `b` slots a call names, `I` = 10 instance, `D` = 5 design, `C` = 1 contr
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pymunk
 
-from codesign_bench.studies.corl2023.scenes import PLANAR_SCENES
 from codesign_bench.task import (
+    OURS,
     Behaviour,
     Booleans,
     Box,
     Floats,
+    Given,
     Quantity,
     Simulator,
     Slots,
     Soundness,
     Task,
     ToolPart,
+    constants,
 )
 
 from ._planar import (
     CHAIN_GRAPH,
+    CHAIN_SCENE,
     COLOURS,
     LINK_HALF_WIDTH,
     PLACE,
@@ -41,56 +44,74 @@ from ._planar import (
     chain_tool,
 )
 
-TABLE = PLANAR_SCENES["catch_balls"]
+PAPER = "paper, table of catch balls"
 
-HAND_START = np.array(TABLE.tool_position_init, dtype=np.float64)
-"""Where the held end starts, m (paper, table of catch balls); it moves along x alone (paper)."""
-FIRST_LINK_ANGLE = -0.5 * np.pi
-"""The first link hangs down from the hand, rad (ours): both joints turned one way make a pan on that side of it."""
-MAX_SPEED = 1.0
-"""Largest speed of the hand, m/s (ours): until the balls come down it cannot change the side of a tool."""
-MAX_ACCELERATION = 10.0
-"""Largest acceleration of the hand, m/s^2 (ours): a tool does not bat balls."""
+HAND_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([20.0, 10.0])
+"""Where the held end starts; it moves along x alone (paper)."""
+LENGTH_INIT: Annotated[tuple[float, float, float], Given("m", PAPER, "tool_length_init")] = (2.0, 1.0, 1.0)
+"""Of the links, from which the design space is made: length = initial length (1 + ratio)."""
+LENGTH_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_length_ratio")] = (-0.5, 2.0)
+"""Range of a length's ratio."""
+ANGLE_SCALE: Annotated[float, Given("degrees", PAPER, "tool_angle_scale")] = 60.0
+"""Angle of ratio 1: angle = scale * ratio."""
+ANGLE_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_angle_ratio")] = (-1.0, 1.0)
+"""Range of an angle's ratio."""
+FIRST_LINK_ANGLE: Annotated[float, Given("rad", OURS)] = -0.5 * np.pi
+"""The first link hangs down from the hand: both joints turned one way make a pan on that side of it."""
+RAIL: Annotated[float, Given("m", OURS)] = 5.0
+"""How far the hand can go to the left or right within the time limit."""
+MAX_SPEED: Annotated[float, Given("m/s", OURS)] = 1.0
+"""Largest speed of the hand: until the balls come down it cannot change the side of a tool."""
+MAX_ACCELERATION: Annotated[float, Given("m/s^2", OURS)] = 10.0
+"""Largest acceleration of the hand: a tool does not bat balls."""
 
-NUM_BALLS = 3
-"""(paper)"""
-BALL_RADIUS = 0.5
-"""m (ours)."""
-GRAVITY = 8.0
-"""m/s^2 (ours)."""
-LINK_FRICTION = 0.7
-"""Between link and ball (ours). The first link has none, so that no ball balances on the hand."""
-BALL_FRICTION = 0.04
-"""Between two balls (ours): they do not stay piled up as a tower."""
+NUM_BALLS: Annotated[int, Given("balls", 'paper, appendix "Environment Details"')] = 3
+"""Thrown in an episode."""
+BALL_RADIUS: Annotated[float, Given("m", OURS)] = 0.5
+"""Of a ball."""
+GRAVITY: Annotated[float, Given("m/s^2", OURS)] = 8.0
+"""Of the scene."""
+LINK_FRICTION: Annotated[float, Given("1", OURS)] = 0.7
+"""Between link and ball. The first link has none, so that no ball balances on the hand."""
+BALL_FRICTION: Annotated[float, Given("1", OURS)] = 0.04
+"""Between two balls: they do not stay piled up as a tower."""
 
-LANDING_DISTANCE = (1.0, 5.0)
-"""Smallest and largest distance from the hand's start of the place where the balls come down, m (ours)."""
-LANDING_SPREAD = 1.2
-"""Largest distance of a ball's own place from that place, m (ours)."""
-START_HEIGHTS = ((16.5, 17.0), (18.25, 18.75), (20.0, 20.5))
-"""Lowest and highest start of each ball, m (ours).
+LANDING_DISTANCE: Annotated[tuple[float, float], Given("m", OURS)] = (1.0, 5.0)
+"""Smallest and largest distance from the hand's start of the place where the balls come down."""
+LANDING_SPREAD: Annotated[float, Given("m", OURS)] = 1.2
+"""Largest distance of a ball's own place from that place."""
+START_HEIGHTS: Annotated[tuple[tuple[float, float], ...], Given("m", OURS)] = (
+    (16.5, 17.0),
+    (18.25, 18.75),
+    (20.0, 20.5),
+)
+"""Lowest and highest start of each ball: above every tool, and so far apart that balls do not meet in the air."""
+THROW_SPEED: Annotated[float, Given("m/s", OURS)] = 3.0
+"""Largest speed along x at which a ball is thrown."""
 
-All lie above every tool. They differ by more than a ball's size, so that balls do not meet in the air.
-"""
-THROW_SPEED = 3.0
-"""Largest speed along x at which a ball is thrown, m/s (ours)."""
+SLOW: Annotated[float, Given("m/s", OURS)] = 0.5
+"""A ball lies still on the tool if it is slower than this, as seen from the tool."""
+PILE_HEIGHT: Annotated[float, Given("m", OURS)] = 2.5
+"""A ball whose centre is less than this above a link lies on it or on balls that lie on it."""
+HOLD_STEPS: Annotated[int, Given("control steps", OURS)] = 15
+"""A ball is caught once it has been held for so long in a row."""
+SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
+"""Added in every control step."""
+SUCCESS_REWARD: Annotated[float, Given("1", "ours; the paper lists one for its 3D tasks only")] = 1.0
+"""Added once, when all balls are caught."""
 
-SLOW = 0.5
-"""A ball lies still on the tool if it is slower than this, as seen from the tool, m/s (ours)."""
-PILE_HEIGHT = 2.5
-"""A ball whose centre is less than this above a link lies on it or on balls that lie on it, m (ours)."""
-HOLD_STEPS = 15
-"""A ball is caught once it has been held for so many control steps in a row (ours)."""
-SUCCESS_REWARD = 1.0
-"""Added once, when all balls are caught (ours; the paper lists one for its 3D tasks only)."""
+FLOOR: Annotated[float, Given("m", OURS)] = -6.0
+"""Height of the floor: even the longest tool leaves room for a pile of three balls beneath it."""
+WALLS: Annotated[tuple[float, float], Given("m", OURS)] = (6.0, 34.0)
+"""Where walls end the scene on the left and right: no tool gets as near to them as two balls are wide."""
 
-FLOOR = -6.0
-"""Height of the floor, m: even the longest tool leaves room for a pile of three balls beneath it (ours)."""
-WALLS = (6.0, 34.0)
-"""Where walls end the scene on the left and right, m: no tool gets as near to them as two balls are wide (ours)."""
-
-CLOCK = Clock(steps=4, period=1.0 / 120.0)
-"""Four physics steps per control step (ours), s: the fastest ball moves a quarter of its radius in a step."""
+HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 150
+"""Time limit."""
+STEPS_PER_CONTROL: Annotated[int, Given("physics steps", OURS, "control_steps_per_action")] = 4
+"""In a control step."""
+PHYSICS_PERIOD: Annotated[float, Given("s", OURS)] = 1.0 / 120.0
+"""Of a physics step: the fastest ball moves a quarter of its radius."""
+CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
 
 
 INSTANCE = Box.of(
@@ -113,7 +134,7 @@ BALL = Box.of(
 )
 """What is observed of one ball."""
 STATE = Box.of(
-    hand_x=(float(HAND_START[0]) - 5.0, float(HAND_START[0]) + 5.0, "m"),
+    hand_x=(float(HAND_START[0]) - RAIL, float(HAND_START[0]) + RAIL, "m"),
     hand_velocity=(-MAX_SPEED, MAX_SPEED, "m/s"),
     **{
         f"ball_{k + 1}_{name}": (low, high, unit)
@@ -177,11 +198,10 @@ class CatchBalls(Task):
 
     name = "catch_balls"
     title = "Catch balls"
-    horizon = TABLE.max_episode_steps
+    scene: ClassVar = {**CHAIN_SCENE, **constants(__name__)}
+    horizon = HORIZON
     control_period = CLOCK.control_period
-    design_space = chain_design_space(
-        TABLE.tool_length_init, TABLE.tool_length_ratio, TABLE.tool_angle_scale, TABLE.tool_angle_ratio
-    )
+    design_space = chain_design_space(LENGTH_INIT, LENGTH_RATIO, ANGLE_SCALE, ANGLE_RATIO)
     tool_graph = CHAIN_GRAPH
     control_space = Box.of(velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"))
     instance_space = INSTANCE
@@ -190,7 +210,7 @@ class CatchBalls(Task):
     state_space = STATE
     reward_terms: ClassVar = {
         "progress": f"(k_now - k_before) / {NUM_BALLS}, k the number of balls held",
-        "slack": f"{TABLE.slack_reward:g}",
+        "slack": f"{SLACK_REWARD:g}",
         "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
     }
     success_conditions: ClassVar = {"all_held": f"all {NUM_BALLS} balls are held"}
@@ -330,7 +350,7 @@ class _CatchSimulator(PlanarSimulator):
         self.set_reward(
             slots,
             progress=(held.sum(axis=1) - self.held[slots].sum(axis=1)) / NUM_BALLS,
-            slack=TABLE.slack_reward,
+            slack=SLACK_REWARD,
             success=SUCCESS_REWARD * self.success[slots],
         )
         self.failure[slots] = lost.any(axis=1) & (lost | caught).all(axis=1)
@@ -341,7 +361,7 @@ class _CatchSimulator(PlanarSimulator):
     def mark(self, slot: int, canvas: Canvas) -> None:
         """Draw the hand's rail and the place where the balls come down."""
         x, y = HAND_START.tolist()
-        canvas.segment((x - 5.0, y), (x + 5.0, y), 0.05, COLOURS["scene"])
+        canvas.segment((x - RAIL, y), (x + RAIL, y), 0.05, COLOURS["scene"])
         canvas.circle((self.landing[slot], y), 0.3, COLOURS["goal"])
 
     def _write_state(self, slots: Slots) -> None:

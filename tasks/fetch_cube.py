@@ -5,18 +5,17 @@ Shapes: `b` slots a call names, `I` = 2 instance (cube's start x, y), `D` = 11 d
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from codesign_bench.studies.corl2023.protocol import PROTOCOL
-from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
-from codesign_bench.studies.corl2023.scenes import BOX_SCENES
 from codesign_bench.task import (
+    OURS,
     Behaviour,
     Booleans,
     Box,
     Floats,
+    Given,
     Quantity,
     Simulator,
     Slots,
@@ -24,10 +23,12 @@ from codesign_bench.task import (
     Task,
     ToolGraph,
     ToolPart,
+    constants,
 )
 from codesign_bench.task.robot import DeployedSimulator, DeploymentSpec, RobotTrials
 
 from ._bullet import (
+    BULLET_SCENE,
     MAX_SLOTS,
     PLACE,
     ROTATION,
@@ -36,81 +37,123 @@ from ._bullet import (
     BulletSimulator,
     Camera,
     Marks,
+    Triple,
     box_parts,
     rotations_about,
 )
 from ._carriers import Carrier
-from ._deployed import NEAR_MISS, TRIAL_STEPS, TRIALS_PER_TOOL, arm_carrier, gripper_handle
+from ._deployed import (
+    DEPLOYED_SCENE,
+    NEAR_MISS,
+    REAL_ROBOT,
+    TRIAL_STEPS,
+    TRIALS_PER_TOOL,
+    arm_carrier,
+    gripper_handle,
+)
 from ._scene import COLOURS, Clock, nearest_clear_shift
 
-TABLE = BOX_SCENES["fetch_cube"]
+PAPER = "paper, table of fetch cube"
+UNSEEN = 'paper, section "Generalization to Unseen Goals Experiment Details"'
 
-PAPER_ORIGIN = 1.2
-"""The robot's base stands at the origin and y points away from it: y = 1.2 m - y of the paper (ours).
+PAPER_ORIGIN: Annotated[float, Given("m", OURS)] = 1.2
+"""The robot's base stands at the origin and y points away from it: y = 1.2 m - y of the paper.
 
 The paper prints cube starts in two frames; this is the shift that makes its real starts -y and its fine-tuning starts
 unsolved (see docs/tasks/fetch_cube.md).
 """
-REGION = PROTOCOL.fetch_cube_region
-CUBE_X = REGION.x
-"""Starts of the cube's centre, m (paper, section "Generalization to Unseen Goals Experiment Details")."""
-CUBE_Y = (PAPER_ORIGIN - REGION.y[1], PAPER_ORIGIN - REGION.y[0])
-"""The same along y, in our frame, m."""
-CUBE_SIZE = 0.05
-"""Side of the cube, m (paper, section "Real Robot Experiment Details")."""
-CUBE_MASS = 0.1
-"""kg (ours)."""
-GOAL_DISTANCE = 0.5
-"""The cube is fetched when its centre is closer to the robot's base than this, m (paper, the same section)."""
-
-HOLD_START = np.array(TABLE.tool_position_init)
-"""Where the held point starts, m (paper, table of fetch cube)."""
-HOLD_X, HOLD_Y = (-0.4, 0.4), (0.3, 0.5)
-"""Where the held point may go, m: 0.8 m x 0.2 m (paper) before the overhang's edge (place ours)."""
-HOLD_TOP = 0.04
-"""Highest place of the held point, m (ours): a thin tool meets the cube's side, never its top."""
-GROUND_CLEARANCE = 0.001
-"""Between the tallest link and the table, m (ours)."""
-START_CLEARANCE = 0.005
-"""A tool that would start closer to the cube than this starts left or right of there, whichever is nearer, m (ours)."""
-STEP_LENGTH = 0.02
-"""Largest move of the held point in one control step, in the plane and vertically, m (ours).
-
-The paper's action scale would be 0.1: at 2.4 m/s cubes are shot from the table.
-"""
-
-OVERHANG_Y = (0.5, 1.1)
-"""Where the overhang hides the table, m (ours)."""
-OVERHANG_X = (-0.75, 0.75)
-"""m (ours): wider than any tool reaches with its held point in its box."""
-OVERHANG_HEIGHT = 0.08
-"""Of its underside above the table, m (ours): 2 cm above any tool."""
-OVERHANG_THICKNESS = 0.02
-"""m (ours)."""
-TABLE_FRICTION = 0.5
-"""Between cube and table (ours)."""
-TOOL_FRICTION = 0.7
-"""Between cube and tool (ours): lets the cube be dragged by a link at up to 35 degrees from square."""
-
-PROGRESS_WEIGHT = 10.0
-"""Reward per metre that the cube comes nearer (ours)."""
-
-CLOCK = Clock(steps=TABLE.control_steps_per_action, period=1.0 / 240.0)
-"""Ten physics steps per control step (paper) of PyBullet's own default length, s."""
-
-SIZES = tuple(
-    (2.0 * low, 2.0 * high) for low, high in zip(TABLE.box_dimensions_min, TABLE.box_dimensions_max, strict=True)
+CUBE_X: Annotated[tuple[float, float], Given("m", UNSEEN, "fetch_cube_region.x")] = (-0.395, 0.395)
+"""Starts of the cube's centre along x."""
+PAPER_CUBE_Y: Annotated[tuple[float, float], Given("m", UNSEEN, "fetch_cube_region.y")] = (0.4, 0.7)
+"""Starts of the cube's centre along y, in the paper's frame."""
+CUBE_Y = (PAPER_ORIGIN - PAPER_CUBE_Y[1], PAPER_ORIGIN - PAPER_CUBE_Y[0])
+"""The same in our frame, m."""
+PAPER_FINE_TUNING: Annotated[tuple[tuple[float, float], ...], Given("m", UNSEEN, "fine_tuning_starts")] = (
+    (-0.167, 0.367),
+    (-0.129, 0.357),
+    (0.430, 0.493),
+    (0.415, 0.610),
 )
-"""Width, length and height of a link, m: the table's numbers are read as half extents (ours)."""
-ANGLES = tuple(float(np.deg2rad(bound)) for bound in (TABLE.tool_angle_min[0], TABLE.tool_angle_max[0]))
-"""Of a joint, rad (paper)."""
+"""Starts outside the training region, in the paper's frame."""
+CUBE_SIZE: Annotated[float, Given("m", REAL_ROBOT)] = 0.05
+"""Side of the cube."""
+CUBE_MASS: Annotated[float, Given("kg", OURS)] = 0.1
+"""Of the cube."""
+GOAL_DISTANCE: Annotated[float, Given("m", REAL_ROBOT, "fetch_cube_distance")] = 0.5
+"""The cube is fetched when its centre is closer to the robot's base than this."""
+
+HOLD_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([0.0, 0.5, 0.02])
+"""Where the held point starts."""
+HOLD_X: Annotated[tuple[float, float], Given("m", "paper: 0.8 m wide; place ours")] = (-0.4, 0.4)
+"""Where the held point may go along x."""
+HOLD_Y: Annotated[tuple[float, float], Given("m", "paper: 0.2 m deep; place ours")] = (0.3, 0.5)
+"""Where the held point may go along y: before the overhang's edge."""
+HOLD_TOP: Annotated[float, Given("m", OURS)] = 0.04
+"""Highest place of the held point: a thin tool meets the cube's side, never its top."""
+GROUND_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.001
+"""Between the tallest link and the table."""
+START_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.005
+"""A tool that would start closer to the cube than this starts left or right of there, whichever is nearer."""
+STEP_LENGTH: Annotated[float, Given("m", OURS, "control_action_scale")] = 0.02
+"""Largest move of the held point in one control step, in the plane and vertically: at the paper's scale it would be as
+fast as 2.4 m/s, and cubes would be shot from the table."""
+
+OVERHANG_Y: Annotated[tuple[float, float], Given("m", OURS)] = (0.5, 1.1)
+"""Where the overhang hides the table."""
+OVERHANG_X: Annotated[tuple[float, float], Given("m", OURS)] = (-0.75, 0.75)
+"""Ends of the overhang: wider than any tool reaches with its held point in its box."""
+OVERHANG_HEIGHT: Annotated[float, Given("m", OURS)] = 0.08
+"""Of its underside above the table: 2 cm above any tool."""
+OVERHANG_THICKNESS: Annotated[float, Given("m", OURS)] = 0.02
+"""Of the overhang."""
+TABLE_FRICTION: Annotated[float, Given("1", OURS)] = 0.5
+"""Between cube and table."""
+TOOL_FRICTION: Annotated[float, Given("1", OURS)] = 0.7
+"""Between cube and tool: lets the cube be dragged by a link at up to 35 degrees from square."""
+
+PROGRESS_WEIGHT: Annotated[float, Given("1/m", OURS)] = 10.0
+"""Reward per metre that the cube comes nearer."""
+SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
+"""Added in every control step."""
+SUCCESS_REWARD: Annotated[float, Given("1", PAPER, "success_reward")] = 10.0
+"""Added once, when the cube is fetched."""
+
+HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 100
+"""Time limit."""
+STEPS_PER_CONTROL: Annotated[int, Given("physics steps", PAPER, "control_steps_per_action")] = 10
+"""In a control step."""
+PHYSICS_PERIOD: Annotated[float, Given("s", "PyBullet's own")] = 1.0 / 240.0
+"""Of a physics step."""
+CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
+
+BOX_MIN: Annotated[Triple, Given("m", PAPER, "box_dimensions_min")] = (0.005, 0.05, 0.005)
+"""Smallest width, length and height of a link, read as half extents (our reading)."""
+BOX_MAX: Annotated[Triple, Given("m", PAPER, "box_dimensions_max")] = (0.015, 0.1, 0.02)
+"""Largest width, length and height of a link, read as half extents (our reading)."""
+SIZES = tuple((2.0 * low, 2.0 * high) for low, high in zip(BOX_MIN, BOX_MAX, strict=True))
+"""Smallest and largest width, length and height of a link, m."""
+ANGLE_MIN: Annotated[float, Given("degrees", PAPER, "tool_angle_min")] = -90.0
+"""Smallest angle of a joint."""
+ANGLE_MAX: Annotated[float, Given("degrees", PAPER, "tool_angle_max")] = 90.0
+"""Largest angle of a joint."""
+ANGLES = float(np.deg2rad(ANGLE_MIN)), float(np.deg2rad(ANGLE_MAX))
 NUM_LINKS = 3
 
-ARM_BASE = (0.0, 0.0, 0.0)
-"""Where a robot's base stands, m: at the origin (paper), on the table (ours)."""
+REAL_STARTS: Annotated[tuple[Triple, ...], Given("m", REAL_ROBOT, "fetch_cube_starts")] = (
+    (-0.110, -0.803, 0.025),
+    (-0.339, -0.588, 0.025),
+    (0.155, -0.731, 0.025),
+    (0.211, -0.633, 0.025),
+)
+"""Starts for which the paper's printed tools were designed, in its robot's frame."""
+GRID_SHAPE: Annotated[tuple[int, int], Given("starts", REAL_ROBOT, "grid_shape")] = (3, 4)
+"""Rows and columns of the grid of starts on which every printed tool is tried."""
+GRID_EXTENT: Annotated[tuple[float, float], Given("m", REAL_ROBOT, "grid_extent")] = (0.12, 0.856)
+"""Depth and width of this grid."""
+ARM_BASE: Annotated[Triple, Given("m", "paper: at the origin; on the table: ours")] = (0.0, 0.0, 0.0)
+"""Where a robot's base stands."""
 ARM_CAMERA = Camera(eye=(0.0, 1.75, 1.0), target=(0.0, 0.38, 0.16))
 """Sees arm and cube in deployment: from behind the overhang."""
-
 
 SIZE_NAMES = ("width", "length", "height")
 DESIGN = Box.of(
@@ -211,7 +254,8 @@ class FetchCube(Task):
 
     name = "fetch_cube"
     title = "Fetch cube"
-    horizon = TABLE.max_episode_steps
+    scene: ClassVar = {**BULLET_SCENE, **DEPLOYED_SCENE, **constants(__name__)}
+    horizon = HORIZON
     control_period = CLOCK.control_period
     design_space = DESIGN
     tool_graph = ToolGraph(
@@ -224,8 +268,8 @@ class FetchCube(Task):
     state_space = STATE
     reward_terms: ClassVar = {
         "progress": f"{PROGRESS_WEIGHT:g} (d_before - d_after), d the distance from cube to base, m",
-        "slack": f"{TABLE.slack_reward:g}",
-        "success": f"{TABLE.success_reward:g} in the step that solves the task",
+        "slack": f"{SLACK_REWARD:g}",
+        "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
     }
     success_conditions: ClassVar = {"at_base": f"the cube's centre is closer than {GOAL_DISTANCE:g} m to the base"}
 
@@ -248,7 +292,7 @@ class FetchCube(Task):
 
     def fine_tuning_instances(self) -> Floats:
         """Return the paper's four starts outside the training region, (4, I), in our frame."""
-        x, y = np.array(PROTOCOL.fine_tuning_starts).T
+        x, y = np.array(PAPER_FINE_TUNING).T
         return np.stack([x, PAPER_ORIGIN - y], axis=1)
 
     def material(self, designs: Floats) -> Floats:
@@ -291,9 +335,8 @@ def _robot_trials() -> RobotTrials:
     centred on the region of starts, so that the row nearest to the robot passes the start of tool 2; at both sides it
     reaches 3 cm beyond the region.
     """
-    own = -np.array(REAL_ROBOT.fetch_cube_starts)[:, XY]
-    depth, width = REAL_ROBOT.grid_extent
-    rows, columns = REAL_ROBOT.grid_shape
+    own = -np.array(REAL_STARTS)[:, XY]
+    (depth, width), (rows, columns) = GRID_EXTENT, GRID_SHAPE
     y = 0.5 * sum(CUBE_Y) + np.linspace(0.5 * depth, -0.5 * depth, rows)
     x = 0.5 * sum(CUBE_X) + np.linspace(-0.5 * width, 0.5 * width, columns)
     return RobotTrials(
@@ -389,8 +432,8 @@ class _FetchCubeSimulator(BulletSimulator):
         self.set_reward(
             slots,
             progress=PROGRESS_WEIGHT * (before - self.distance[slots]),
-            slack=TABLE.slack_reward,
-            success=TABLE.success_reward * self.success[slots],
+            slack=SLACK_REWARD,
+            success=SUCCESS_REWARD * self.success[slots],
         )
 
     def mark(self, slot: int, marks: Marks) -> None:

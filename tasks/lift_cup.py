@@ -6,16 +6,16 @@ Shapes: `B` slots, `b` slots a call names, `I` = 2 instance (cup's width and hei
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
-from codesign_bench.studies.corl2023.scenes import BOX_SCENES
 from codesign_bench.task import (
+    OURS,
     Behaviour,
     Box,
     Floats,
+    Given,
     Quantity,
     Simulator,
     Slots,
@@ -23,10 +23,12 @@ from codesign_bench.task import (
     Task,
     ToolGraph,
     ToolPart,
+    constants,
 )
 from codesign_bench.task.robot import DeployedSimulator, DeploymentSpec, RobotTrials
 
 from ._bullet import (
+    BULLET_SCENE,
     MAX_SLOTS,
     PLACE,
     ROTATION,
@@ -35,96 +37,142 @@ from ._bullet import (
     BulletSimulator,
     Camera,
     Marks,
+    Triple,
     box_parts,
     rotation_matrices,
     rotations_about,
 )
 from ._carriers import Carrier
-from ._deployed import NEAR_MISS, TRIAL_STEPS, TRIALS_PER_TOOL, arm_carrier, gripper_handle
+from ._deployed import (
+    DEPLOYED_SCENE,
+    NEAR_MISS,
+    REAL_ROBOT,
+    TRIAL_STEPS,
+    TRIALS_PER_TOOL,
+    arm_carrier,
+    gripper_handle,
+)
 from ._scene import COLOURS, Clock
 
-TABLE = BOX_SCENES["lift_cup"]
+PAPER = "paper, table of lift cup"
 
-TOOL_START = np.array(TABLE.tool_position_init, dtype=np.float64)
-"""Where the held end of the handle starts, m (paper, table of lift cup); z is measured from the table top (ours)."""
-HANDLE_HALF_EXTENTS = np.array([0.01, 0.05, 0.01])
-"""Of the handle, m (ours; the paper says that it is fixed)."""
-BAR_THICKNESS = 0.02
-"""Of the cross bar, along y and z, m (ours)."""
+TOOL_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([0.0, 1.2, 0.05])
+"""Where the held end of the handle starts; z is measured from the table top (ours)."""
+BOX_MIN: Annotated[Triple, Given("m", PAPER, "box_dimensions_min")] = (0.005, 0.02, 0.01)
+"""Smallest width, length and height of a prong, read as half extents (our reading)."""
+BOX_MAX: Annotated[Triple, Given("m", PAPER, "box_dimensions_max")] = (0.01, 0.1, 0.03)
+"""Largest width, length and height of a prong, read as half extents (our reading)."""
+ANGLE_MIN: Annotated[float, Given("degrees", PAPER, "tool_angle_min")] = -30.0
+"""Smallest tilt of the prongs."""
+ANGLE_MAX: Annotated[float, Given("degrees", PAPER, "tool_angle_max")] = 30.0
+"""Largest tilt of the prongs."""
+HANDLE_HALF_EXTENTS: Annotated[Floats, Given("m", "ours; the paper says that it is fixed")] = np.array(
+    [0.01, 0.05, 0.01]
+)
+"""Of the handle."""
+BAR_THICKNESS: Annotated[float, Given("m", OURS)] = 0.02
+"""Of the cross bar, along y and z."""
 PRONG_START = 2.0 * HANDLE_HALF_EXTENTS[1] + BAR_THICKNESS
-"""Distance of the prongs' rear ends from the held end, along y, m (ours)."""
-TOOL_CLEARANCE = 0.002
-"""The lowest point of a tool stays this far above the table, m (ours)."""
-WORKSPACE = Box.of(held_x=(-0.15, 0.15, "m"), held_y=(1.1, 1.75, "m"), held_z=(0.0, 0.7, "m"))
-"""Where the held end may go (ours); a tool's lowest point limits z further."""
-MAX_MOVE = 0.02
-"""Longest way of the held end in a control step, m (ours): 0.48 m/s, too slow to bat a cup away."""
+"""Distance of the prongs' rear ends from the held end, along y, m."""
+TOOL_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.002
+"""The lowest point of a tool stays this far above the table."""
+WORKSPACE: Annotated[Box, Given("m", OURS)] = Box.of(
+    held_x=(-0.15, 0.15, "m"), held_y=(1.1, 1.75, "m"), held_z=(0.0, 0.7, "m")
+)
+"""Where the held end may go; a tool's lowest point limits z further."""
+MAX_MOVE: Annotated[float, Given("m", OURS, "control_action_scale")] = 0.02
+"""Longest way of the held end in a control step: 0.48 m/s, too slow to bat a cup away; the paper's scale would be
+2.4 m/s."""
 
-CUP_UNIT = 0.18
-"""Width and height of a cup of scale 1, m (ours): rims of all widths fit between prongs of the design space."""
-CUP_START_Y = 1.65
-"""Where cups stand, x being 0, m (ours): no fork reaches a rim at the start."""
-CUP_MASS = 0.2
-"""kg (ours)."""
-WALL = 0.008
-"""Thickness of walls and bottom, m (ours)."""
-RIM_WIDTH = 0.02
-"""How far the rim stands out from the walls, m (ours): the play of a prong between wall and the rim's edge."""
-RIM_THICKNESS = 0.008
-"""m (ours)."""
-WALL_GAP = 0.002
-"""Walls end this high above the bottom's underside, m (ours): a cup on the table then has 4 contacts instead of 20."""
-CUP_FRICTION = 0.25
-"""Of the cup; table and tool have 1, and the engine multiplies (ours)."""
-TABLE_TOP = (-0.5, 0.5), (0.8, 2.4)
-"""Ends of the table along x and y, m (ours)."""
-TABLE_HALF_THICKNESS = 0.1
-"""m (ours)."""
+CUP_UNIT: Annotated[float, Given("m", OURS)] = 0.18
+"""Width and height of a cup of scale 1: rims of all widths fit between prongs of the design space."""
+CUP_WIDTHS: Annotated[tuple[float, float], Given("1", f"{REAL_ROBOT}: range of its real cups")] = (0.3, 0.9)
+"""Smallest and largest scale of a cup's width."""
+CUP_HEIGHTS: Annotated[tuple[float, float], Given("1", f"{REAL_ROBOT}: range of its real cups")] = (0.6, 0.9)
+"""Smallest and largest scale of a cup's height."""
+CUP_START_Y: Annotated[float, Given("m", OURS)] = 1.65
+"""Where cups stand, x being 0: no fork reaches a rim at the start."""
+CUP_MASS: Annotated[float, Given("kg", OURS)] = 0.2
+"""Of a cup."""
+WALL: Annotated[float, Given("m", OURS)] = 0.008
+"""Thickness of walls and bottom."""
+RIM_WIDTH: Annotated[float, Given("m", OURS)] = 0.02
+"""How far the rim stands out from the walls: the play of a prong between wall and the rim's edge."""
+RIM_THICKNESS: Annotated[float, Given("m", OURS)] = 0.008
+"""Of the rim."""
+WALL_GAP: Annotated[float, Given("m", OURS)] = 0.002
+"""Walls end this high above the bottom's underside: a cup on the table then has 4 contacts instead of 20."""
+CUP_FRICTION: Annotated[float, Given("1", OURS)] = 0.25
+"""Of the cup; table and tool have 1, and the engine multiplies."""
+TABLE_TOP: Annotated[tuple[tuple[float, float], tuple[float, float]], Given("m", OURS)] = (-0.5, 0.5), (0.8, 2.4)
+"""Ends of the table along x and y."""
+TABLE_HALF_THICKNESS: Annotated[float, Given("m", OURS)] = 0.1
+"""Of the table."""
 
-SUCCESS_HEIGHT = 0.4
-"""The cup's lowest corner must rise above this, m (paper, appendix "Real Robot Experiment Details")."""
-UPRIGHT = 0.9
-"""Cosine of the tilt up to which a cup is upright (ours): 26 degrees."""
-TIPPED = 0.7
-"""Cosine of the tilt beyond which a cup has tipped over (ours): 46 degrees."""
-FALLEN_HEIGHT = -0.05
-"""A cup whose centre is below this has fallen off the table, m (ours)."""
+SUCCESS_HEIGHT: Annotated[float, Given("m", REAL_ROBOT, "lift_cup_height")] = 0.4
+"""The cup's lowest corner must rise above this."""
+UPRIGHT: Annotated[float, Given("1", OURS)] = 0.9
+"""Cosine of the tilt up to which a cup is upright: 26 degrees."""
+TIPPED: Annotated[float, Given("1", OURS)] = 0.7
+"""Cosine of the tilt beyond which a cup has tipped over: 46 degrees."""
+FALLEN_HEIGHT: Annotated[float, Given("m", OURS)] = -0.05
+"""A cup whose centre is below this has fallen off the table."""
 
-LIFT_WEIGHT = 10.0
-"""Of the height in the reward, 1/m (ours)."""
-FIT_WEIGHT = 4.0
-"""Of the distance between prongs and rim in the reward, 1/m (ours)."""
-FIT_LENGTH = 0.03
-"""Within this distance the prongs count as fitting the rim, m (ours)."""
-PLAY = 0.25 * RIM_WIDTH
-"""Prongs this far from the middle of the rim still fit perfectly, m (ours)."""
-START_POTENTIAL = -1.0
-"""Of every episode's start: the one of prongs 0.25 m away (ours)."""
+LIFT_WEIGHT: Annotated[float, Given("1/m", OURS)] = 10.0
+"""Of the height in the reward."""
+FIT_WEIGHT: Annotated[float, Given("1/m", OURS)] = 4.0
+"""Of the distance between prongs and rim in the reward."""
+FIT_LENGTH: Annotated[float, Given("m", OURS)] = 0.03
+"""Within this distance the prongs count as fitting the rim."""
+PLAY: Annotated[float, Given("m", OURS)] = 0.25 * RIM_WIDTH
+"""Prongs this far from the middle of the rim still fit perfectly."""
+START_POTENTIAL: Annotated[float, Given("1", OURS)] = -1.0
+"""Of every episode's start: the one of prongs 0.25 m away."""
+SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
+"""Added in every control step."""
+SUCCESS_REWARD: Annotated[float, Given("1", PAPER, "success_reward")] = 10.0
+"""Added once, when the cup is lifted."""
 
-ARM_BASE = (0.0, 1.0, 0.3)
-"""Where a robot's base stands, m (ours): 0.3 m above the table and 0.65 m before the cup.
+REAL_CUPS: Annotated[tuple[tuple[float, float], ...], Given("1", REAL_ROBOT, "lift_cup_sizes")] = (
+    (0.3, 0.6),
+    (0.3, 0.9),
+    (0.5, 0.8),
+    (0.9, 0.6),
+)
+"""Scales of width and height of the cups for which the paper's printed tools were designed."""
+ARM_BASE: Annotated[Triple, Given("m", OURS)] = (0.0, 1.0, 0.3)
+"""Where a robot's base stands: 0.3 m above the table and 0.65 m before the cup.
 
-From there a Panda reaches from below the rims up to the lifted cup; the paper does not tell where its own stood.
+From there a Panda reaches from below the rims up to the lifted cup; the paper does not say where its own stood.
 """
 ARM_CAMERA = Camera(eye=(1.5, 1.45, 0.7), target=(0.0, 1.3, 0.42))
 """Sees arm and cup in deployment."""
 
-CLOCK = Clock(steps=TABLE.control_steps_per_action, period=1.0 / 240.0)
-"""Ten physics steps per control step (paper, table of lift cup) of 1/240 s (ours)."""
+HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 150
+"""Time limit."""
+STEPS_PER_CONTROL: Annotated[int, Given("physics steps", PAPER, "control_steps_per_action")] = 10
+"""In a control step."""
+PHYSICS_PERIOD: Annotated[float, Given("s", "PyBullet's own")] = 1.0 / 240.0
+"""Of a physics step."""
+CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
 
 FORK_GRAPH = ToolGraph(num_nodes=4, edges=((0, 1), (1, 2), (1, 3)), parameter_nodes=(1, 2, 2, 2, 2))
 """Handle, cross bar, left and right prong; the right prong is the left one's mirror image and has no own parameters."""
 
 
+(_WIDTH, _LENGTH, _HEIGHT) = ((2.0 * low, 2.0 * high, "m") for low, high in zip(BOX_MIN, BOX_MAX, strict=True))
 DESIGN = Box.of(
-    prong_distance=(2.0 * TABLE.box_dimensions_min[1], 2.0 * TABLE.box_dimensions_max[1], "m"),
-    prong_tilt=(float(np.deg2rad(TABLE.tool_angle_min[0])), float(np.deg2rad(TABLE.tool_angle_max[0])), "rad"),
-    prong_width=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
-    prong_length=(2.0 * TABLE.box_dimensions_min[1], 2.0 * TABLE.box_dimensions_max[1], "m"),
-    prong_height=(2.0 * TABLE.box_dimensions_min[2], 2.0 * TABLE.box_dimensions_max[2], "m"),
+    prong_distance=_LENGTH,  # the paper gives no range for the distance
+    prong_tilt=(float(np.deg2rad(ANGLE_MIN)), float(np.deg2rad(ANGLE_MAX)), "rad"),
+    prong_width=_WIDTH,
+    prong_length=_LENGTH,
+    prong_height=_HEIGHT,
 )
 
-INSTANCE = Box.of(cup_width_scale=(0.3, 0.9, "0.18 m"), cup_height_scale=(0.6, 0.9, "0.18 m"))
+INSTANCE = Box.of(
+    cup_width_scale=(*CUP_WIDTHS, f"{CUP_UNIT:g} m"),
+    cup_height_scale=(*CUP_HEIGHTS, f"{CUP_UNIT:g} m"),
+)
 CUP_WIDTH = INSTANCE.index("cup_width_scale")
 STATE = Box.of(
     held_x=(WORKSPACE.low[0], WORKSPACE.high[0], "m"),
@@ -212,7 +260,8 @@ class LiftCup(Task):
 
     name = "lift_cup"
     title = "Lift cup"
-    horizon = TABLE.max_episode_steps
+    scene: ClassVar = {**BULLET_SCENE, **DEPLOYED_SCENE, **constants(__name__)}
+    horizon = HORIZON
     control_period = CLOCK.control_period
     design_space = DESIGN
     tool_graph = FORK_GRAPH
@@ -224,8 +273,8 @@ class LiftCup(Task):
     state_space = STATE
     reward_terms: ClassVar = {
         "progress": f"change of {LIFT_WEIGHT:g} h - {FIT_WEIGHT:g} d + f, h, d and f as below",
-        "slack": f"{TABLE.slack_reward:g}",
-        "success": f"{TABLE.success_reward:g} in the step that solves the task",
+        "slack": f"{SLACK_REWARD:g}",
+        "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
     }
     success_conditions: ClassVar = {
         "lifted": f"the cup's lowest corner is higher than {SUCCESS_HEIGHT:g} m",
@@ -272,7 +321,7 @@ class LiftCup(Task):
 def _robot_trials() -> RobotTrials:
     """Return the four cups of the paper's tools; there is no grid."""
     return RobotTrials(
-        own=np.array(REAL_ROBOT.lift_cup_sizes),
+        own=np.array(REAL_CUPS),
         grid=np.zeros((0, 0, INSTANCE.size)),
         success_outcome=SUCCESS_HEIGHT,
         near_miss=NEAR_MISS,
@@ -458,8 +507,8 @@ class _LiftCupSimulator(BulletSimulator):
         self.set_reward(
             slots,
             progress=potential - self.potential[slots],
-            slack=TABLE.slack_reward,
-            success=TABLE.success_reward * self.success[slots],
+            slack=SLACK_REWARD,
+            success=SUCCESS_REWARD * self.success[slots],
         )
         self.potential[slots] = potential
 

@@ -5,27 +5,30 @@ Shapes: `b` slots a call names, `I` = 2 instance (goal x, y), `D` = 5 design, `C
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pymunk
 
-from codesign_bench.studies.corl2023.scenes import PLANAR_SCENES
 from codesign_bench.task import (
+    OURS,
     Behaviour,
     Booleans,
     Box,
     Floats,
+    Given,
     Quantity,
     Simulator,
     Slots,
     Soundness,
     Task,
     ToolPart,
+    constants,
 )
 
 from ._planar import (
     CHAIN_GRAPH,
+    CHAIN_SCENE,
     COLOURS,
     LINK_HALF_WIDTH,
     PLACE,
@@ -42,43 +45,59 @@ from ._planar import (
 )
 from ._scene import nearest_clear_shift
 
-TABLE = PLANAR_SCENES["push"]
+PAPER = "paper, table of push"
+EARLY = "scale of the first author's early scenes"
 
-TOOL_START = np.array(TABLE.tool_position_init, dtype=np.float64)
-"""Where the held end starts, m (paper, table of push)."""
-START_CLEARANCE = 0.25
-"""A tool that would start closer to the puck than this starts left or right of there, whichever is nearer, m (ours)."""
-FIRST_LINK_ANGLE = np.pi
-"""The first link points left and passes above the puck, rad (ours)."""
-WORKSPACE = Box.of(base_x=(14.0, 24.0, "m"), base_y=(6.5, 10.5, "m"))
-"""Where the held end may go: too low a place to lift a deep hook over the puck and use it on the other side (ours)."""
-MAX_SPEED = 6.0
-"""Largest speed of the held end along each axis, m/s (ours): 0.1 m a physics step, a tenth of the puck's radius."""
+TOOL_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([20.0, 10.0])
+"""Where the held end starts."""
+START_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.25
+"""A tool that would start closer to the puck than this starts left or right of there, whichever is nearer."""
+LENGTH_INIT: Annotated[tuple[float, float, float], Given("m", PAPER, "tool_length_init")] = (2.0, 2.0, 2.0)
+"""Of the links, from which the design space is made: length = initial length (1 + ratio)."""
+LENGTH_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_length_ratio")] = (-0.5, 0.5)
+"""Range of a length's ratio."""
+ANGLE_SCALE: Annotated[float, Given("degrees", PAPER, "tool_angle_scale")] = 90.0
+"""Angle of ratio 1: angle = scale * ratio."""
+ANGLE_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_angle_ratio")] = (-1.0, 1.0)
+"""Range of an angle's ratio."""
+FIRST_LINK_ANGLE: Annotated[float, Given("rad", OURS)] = np.pi
+"""The first link points left and passes above the puck."""
+WORKSPACE: Annotated[Box, Given("m", OURS)] = Box.of(base_x=(14.0, 24.0, "m"), base_y=(6.5, 10.5, "m"))
+"""Where the held end may go: too low a place to lift a deep hook over the puck and use it on the other side."""
+MAX_SPEED: Annotated[float, Given("m/s", OURS)] = 6.0
+"""Largest speed of the held end along each axis: a tenth of the puck's radius in a physics step."""
 
-PUCK_START = np.array([16.0, 8.25])
-"""m (ours)."""
-PUCK_RADIUS = 1.0
-"""m (scale of the first author's early scenes)."""
-PUCK_DENSITY = 1.0
-"""kg/m^2 (scale of the early scenes)."""
-PUCK_DECELERATION = 12.0
-"""Friction of the table stops a sliding puck at this rate, m/s^2 (ours): at full tool speed within 1.5 m."""
-CONTACT_FRICTION = 0.3
-"""Between link and puck (scale of the early scenes)."""
+PUCK_START: Annotated[Floats, Given("m", OURS)] = np.array([16.0, 8.25])
+"""Where the puck starts, at rest."""
+PUCK_RADIUS: Annotated[float, Given("m", EARLY)] = 1.0
+"""Of the puck."""
+PUCK_DENSITY: Annotated[float, Given("kg/m^2", EARLY)] = 1.0
+"""Of the puck."""
+PUCK_DECELERATION: Annotated[float, Given("m/s^2", OURS)] = 12.0
+"""Friction of the table slows a sliding puck down at this rate: from full tool speed to rest within 1.5 m."""
+CONTACT_FRICTION: Annotated[float, Given("1", EARLY)] = 0.3
+"""Between link and puck."""
 
-GOAL_DISTANCE = (3.0, 5.0)
-"""Smallest and largest distance of a goal from the puck's start, m (ours)."""
-GOAL_RADIUS = 1.5
-"""The puck's centre must stop within this distance of the goal, m (goal radius of the early scenes)."""
-REST_SPEED = 0.2
-"""A puck slower than this is at rest, m/s (ours)."""
-REST_STEPS = 3
-"""Control steps in a row for which the puck must rest at the goal (ours)."""
-SUCCESS_REWARD = 1.0
-"""Added once, when the puck rests at the goal (ours; the paper lists one for its 3D tasks only)."""
+GOAL_DISTANCE: Annotated[tuple[float, float], Given("m", OURS)] = (3.0, 5.0)
+"""Smallest and largest distance of a goal from the puck's start."""
+GOAL_RADIUS: Annotated[float, Given("m", EARLY)] = 1.5
+"""The puck's centre must stop within this distance of the goal."""
+REST_SPEED: Annotated[float, Given("m/s", OURS)] = 0.2
+"""A puck slower than this is at rest."""
+REST_STEPS: Annotated[int, Given("control steps", OURS)] = 3
+"""How long the puck must rest at the goal."""
+SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
+"""Added in every control step."""
+SUCCESS_REWARD: Annotated[float, Given("1", "ours; the paper lists one for its 3D tasks only")] = 1.0
+"""Added once, when the puck rests at the goal."""
 
-CLOCK = Clock(steps=2, period=1.0 / 60.0)
-"""Two physics steps per control step (ours), each as long as the early scenes', s."""
+HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 150
+"""Time limit."""
+STEPS_PER_CONTROL: Annotated[int, Given("physics steps", OURS, "control_steps_per_action")] = 2
+"""In a control step."""
+PHYSICS_PERIOD: Annotated[float, Given("s", EARLY)] = 1.0 / 60.0
+"""Of a physics step."""
+CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
 
 
 STATE = Box.of(
@@ -148,11 +167,10 @@ class Push(Task):
 
     name = "push"
     title = "Push"
-    horizon = TABLE.max_episode_steps
+    scene: ClassVar = {**CHAIN_SCENE, **constants(__name__)}
+    horizon = HORIZON
     control_period = CLOCK.control_period
-    design_space = chain_design_space(
-        TABLE.tool_length_init, TABLE.tool_length_ratio, TABLE.tool_angle_scale, TABLE.tool_angle_ratio
-    )
+    design_space = chain_design_space(LENGTH_INIT, LENGTH_RATIO, ANGLE_SCALE, ANGLE_RATIO)
     tool_graph = CHAIN_GRAPH
     control_space = Box.of(velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"), velocity_y=(-MAX_SPEED, MAX_SPEED, "m/s"))
     instance_space = Box.of(
@@ -164,7 +182,7 @@ class Push(Task):
     state_space = STATE
     reward_terms: ClassVar = {
         "progress": "(d_before - d_after) / d_start, d the distance from puck to goal, m",
-        "slack": f"{TABLE.slack_reward:g}",
+        "slack": f"{SLACK_REWARD:g}",
         "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
     }
     success_conditions: ClassVar = {
@@ -293,7 +311,7 @@ class _PushSimulator(PlanarSimulator):
         self.set_reward(
             slots,
             progress=(self.distance[slots] - distance) / self.start_distance[slots],
-            slack=TABLE.slack_reward,
+            slack=SLACK_REWARD,
             success=SUCCESS_REWARD * self.success[slots],
         )
         self.distance[slots] = distance

@@ -9,17 +9,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pymunk
 
-from codesign_bench.studies.corl2023.scenes import PLANAR_SCENES
 from codesign_bench.task import (
+    OURS,
     Behaviour,
     Booleans,
     Box,
     Floats,
+    Given,
     Physics,
     Quantity,
     Simulator,
@@ -27,6 +28,7 @@ from codesign_bench.task import (
     Soundness,
     Task,
     ToolPart,
+    constants,
 )
 
 from ._planar import (
@@ -45,101 +47,118 @@ from ._planar import (
     overlap,
 )
 
-TABLE = PLANAR_SCENES["scoop"]
+PAPER = "paper, table of scoop"
+TEXT = 'paper, appendix "Environment Details"'
 
-TOOL_START = np.array(TABLE.tool_position_init, dtype=np.float64)
-"""Where the tool starts, m (paper, table of scoop): x of its first joint and y of its lowest point (our reading)."""
-START_SHIFT = 0.4
-"""The first joint starts up to this far to the left or right of there, m (ours)."""
-FIRST_LINK_ANGLE = -np.pi / 3.0
-"""The first link, the handle, points down to the right; the others curl up and make a ladle, rad (ours)."""
-LINK_HALF_WIDTH = 0.12
-"""Half the thickness of a link, m (ours): a fifth of a ball's radius, so that a tool takes little room in the pile."""
-TOOL_MASS = 8.0
-"""kg (ours); its centre is the first joint."""
-TOOL_MOMENT = 80.0
-"""Moment of inertia about the first joint, kg m^2 (ours)."""
-TOOL_FRICTION = 1.0
-"""Of the links' surface (ours); pymunk multiplies the two frictions of a contact."""
+TOOL_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([15.0, 10.0])
+"""Where the tool starts: x of its first joint and y of its lowest point (our reading)."""
+START_SHIFT: Annotated[float, Given("m", OURS)] = 0.4
+"""The first joint starts up to this far to the left or right of there."""
+LENGTH_INIT: Annotated[tuple[float, float, float], Given("m", PAPER, "tool_length_init")] = (6.0, 3.0, 3.0)
+"""Of the links, from which the design space is made: length = initial length (1 + ratio)."""
+LENGTH_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_length_ratio")] = (-0.7, 0.2)
+"""Range of a length's ratio."""
+ANGLE_SCALE: Annotated[float, Given("degrees", PAPER, "tool_angle_scale")] = 90.0
+"""Angle of ratio 1: angle = scale * ratio."""
+ANGLE_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_angle_ratio")] = (-0.1, 0.7)
+"""Range of an angle's ratio."""
+FIRST_LINK_ANGLE: Annotated[float, Given("rad", OURS)] = -np.pi / 3.0
+"""The first link, the handle, points down to the right; the others curl up and make a ladle."""
+LINK_HALF_WIDTH: Annotated[float, Given("m", OURS)] = 0.12
+"""Half the thickness of a link: a fifth of a ball's radius, so that a tool takes little room in the pile."""
+TOOL_MASS: Annotated[float, Given("kg", OURS)] = 8.0
+"""Of the tool; its centre is the first joint."""
+TOOL_MOMENT: Annotated[float, Given("kg m^2", OURS)] = 80.0
+"""Moment of inertia about the first joint."""
+TOOL_FRICTION: Annotated[float, Given("1", OURS)] = 1.0
+"""Of the links' surface; pymunk multiplies the two frictions of a contact."""
 
-HAND_FORCE = 600.0
-"""The hand moves the tool with at most this force, N (ours): an unstoppable tool would shoot balls out of the pile."""
-HAND_TORQUE = 2400.0
-"""The hand turns the tool with at most this torque, N m (ours)."""
-MAX_SPEED = 1.5
-"""Largest speed of the first joint along each axis, m/s (ours): out of the pile takes about 18 of the 30 steps."""
-MAX_ACCELERATION = 3.0
-"""The hand's velocity along an axis changes at most this fast, m/s^2 (ours): balls can hardly be shaken off."""
-MAX_TURN = 0.3
-"""Largest angular velocity of the tool, rad/s (ours)."""
-MAX_TILT = 0.1
-"""The hand tilts the tool by at most this from its start, rad (ours): less than it takes to make balls slide."""
+HAND_FORCE: Annotated[float, Given("N", OURS)] = 600.0
+"""The hand moves the tool with at most this force: an unstoppable tool would shoot balls out of the pile."""
+HAND_TORQUE: Annotated[float, Given("N m", OURS)] = 2400.0
+"""The hand turns the tool with at most this torque."""
+MAX_SPEED: Annotated[float, Given("m/s", OURS)] = 1.5
+"""Largest speed of the first joint along each axis: out of the pile takes about 18 of the 30 steps."""
+MAX_ACCELERATION: Annotated[float, Given("m/s^2", OURS)] = 3.0
+"""The hand's velocity along an axis changes at most this fast: balls can hardly be shaken off."""
+MAX_TURN: Annotated[float, Given("rad/s", OURS)] = 0.3
+"""Largest angular velocity of the tool."""
+MAX_TILT: Annotated[float, Given("rad", OURS)] = 0.1
+"""The hand tilts the tool by at most this from its start: less than it takes to make balls slide."""
 
-NUM_BALLS = 40
-"""(paper, appendix "Environment Details")."""
-BALL_RADIUS = 0.6
-"""m (ours)."""
-BALL_MASS = float(np.pi * BALL_RADIUS**2)
-"""kg: 1 kg/m^2 (scale of the first author's early scenes)."""
-BALL_FRICTION = 0.2
-"""Of the balls' surface (ours). Balls do not turn, so they never roll: they rest on slopes of up to 11 degrees."""
-WALL_FRICTION = 0.5
-"""Of floor and walls (ours)."""
-GRAVITY = 10.0
-"""m/s^2 (ours)."""
-DAMPING = 0.5
-"""Share of its velocity that a body keeps over 1 s (ours); nothing falls faster than gravity / ln 2 = 14.4 m/s."""
+NUM_BALLS: Annotated[int, Given("balls", TEXT)] = 40
+"""In the reservoir."""
+BALL_RADIUS: Annotated[float, Given("m", OURS)] = 0.6
+"""Of a ball."""
+BALL_DENSITY: Annotated[float, Given("kg/m^2", "scale of the first author's early scenes")] = 1.0
+"""Of a ball."""
+BALL_MASS = float(np.pi * BALL_RADIUS**2) * BALL_DENSITY
+BALL_FRICTION: Annotated[float, Given("1", OURS)] = 0.2
+"""Of the balls' surface. Balls do not turn, so they never roll: they rest on slopes of up to 11 degrees."""
+WALL_FRICTION: Annotated[float, Given("1", OURS)] = 0.5
+"""Of floor and walls."""
+GRAVITY: Annotated[float, Given("m/s^2", OURS)] = 10.0
+"""Of the scene."""
+DAMPING: Annotated[float, Given("1", OURS)] = 0.5
+"""Share of its velocity that a body keeps over 1 s; nothing falls faster than gravity / ln 2 = 14.4 m/s."""
 
-CLEARANCE = 2.0 * BALL_RADIUS + LINK_HALF_WIDTH + 0.08
-"""Every joint and end of the tool keeps this far from floor and walls, m (ours): a ball fits between unsqueezed."""
-FLOOR = float(TOOL_START[1]) - CLEARANCE
-"""y of the floor, m (ours): tools start as low as they may go."""
-RESERVOIR = (9.5, 24.0)
-"""x of the reservoir's walls, m (ours): room for the widest tool at every start."""
-RIM = 14.0
-"""y of the upper ends of these walls, m (ours): above the piles, which are about 4.8 m deep."""
-YARD = (6.0, 27.5)
-"""x of the outer walls, which keep spilled balls in the picture, m (ours)."""
-WALL_HALF_WIDTH = 0.5
-"""Half the thickness of floor and walls, m (ours)."""
-LINE = 15.0
-"""A ball whose centre is above this is out of the reservoir, y in m (ours): 1 m above the rim."""
-CLEAR = LINE - BALL_RADIUS - LINK_HALF_WIDTH
-"""A tool whose lowest point is above this is clear: every ball that rests on it is out, y in m."""
-CEILING = CLEAR + 0.5
-"""The hand lifts the tool's lowest point no higher than this, y in m (ours)."""
+CLEARANCE: Annotated[float, Given("m", OURS)] = 2.0 * BALL_RADIUS + LINK_HALF_WIDTH + 0.08
+"""Every joint and end of the tool keeps this far from floor and walls: a ball fits between unsqueezed."""
+FLOOR: Annotated[float, Given("m", OURS)] = float(TOOL_START[1]) - CLEARANCE
+"""y of the floor: tools start as low as they may go."""
+RESERVOIR: Annotated[tuple[float, float], Given("m", OURS)] = (9.5, 24.0)
+"""x of the reservoir's walls: room for the widest tool at every start."""
+RIM: Annotated[float, Given("m", OURS)] = 14.0
+"""y of the upper ends of these walls: above the piles, which are about 4.8 m deep."""
+YARD: Annotated[tuple[float, float], Given("m", OURS)] = (6.0, 27.5)
+"""x of the outer walls, which keep spilled balls in the picture."""
+WALL_HALF_WIDTH: Annotated[float, Given("m", OURS)] = 0.5
+"""Half the thickness of floor and walls."""
+LINE: Annotated[float, Given("m", OURS)] = 15.0
+"""A ball whose centre is above this y is out of the reservoir: 1 m above the rim."""
+CLEAR: Annotated[float, Given("m", OURS)] = LINE - BALL_RADIUS - LINK_HALF_WIDTH
+"""A tool whose lowest point is above this y is clear: every ball that rests on it is out."""
+CEILING: Annotated[float, Given("m", OURS)] = CLEAR + 0.5
+"""The hand lifts the tool's lowest point no higher than this y."""
 
-GOAL_NUMBERS = (1, 7)
-"""Smallest and largest wanted number of balls (paper, appendix "Environment Details")."""
-REST_SPEED = 0.3
-"""A ball on the tool is at rest when it moves slower than this relative to the tool, m/s (ours)."""
-HELD_STEPS = 3
-"""Control steps in a row for which the wanted number must be held at rest (ours)."""
-NUMBER_EXPONENT = 1.5
-"""How sharply progress prefers the wanted number (ours)."""
-SUCCESS_REWARD = 1.0
-"""Added once, when the wanted number is held (ours; the paper lists one for its 3D tasks only)."""
+GOAL_NUMBERS: Annotated[tuple[int, int], Given("balls", TEXT)] = (1, 7)
+"""Smallest and largest wanted number of balls."""
+REST_SPEED: Annotated[float, Given("m/s", OURS)] = 0.3
+"""A ball on the tool is at rest when it moves slower than this relative to the tool."""
+HELD_STEPS: Annotated[int, Given("control steps", OURS)] = 3
+"""How long in a row the wanted number must be held at rest."""
+NUMBER_EXPONENT: Annotated[float, Given("1", OURS)] = 1.5
+"""How sharply progress prefers the wanted number."""
+SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
+"""Added in every control step."""
+SUCCESS_REWARD: Annotated[float, Given("1", "ours; the paper lists one for its 3D tasks only")] = 1.0
+"""Added once, when the wanted number is held."""
 
-NUM_PILES = 32
-"""Different piles (ours)."""
-PILE_SEED = 40
-"""Seed of the places from which balls fall into the piles (ours)."""
-PILE_STEPS = 240
-"""Physics steps in which a pile comes to rest (ours)."""
+NUM_PILES: Annotated[int, Given("piles", OURS)] = 32
+"""Different piles."""
+PILE_SEED: Annotated[int, Given("1", OURS)] = 40
+"""Seed of the places from which balls fall into the piles."""
+PILE_STEPS: Annotated[int, Given("physics steps", OURS)] = 240
+"""In which a pile comes to rest."""
 HEAP_COLUMNS = np.linspace(RESERVOIR[0] + BALL_RADIUS, RESERVOIR[1] - BALL_RADIUS, 11)
 """x of the columns in which balls lie that make room for the tool, m (ours): balls in neighbouring ones are apart."""
-GAP = 0.02
-"""Balls that make room lie this far above others at least, and no ball starts closer to the tool, m (ours)."""
+GAP: Annotated[float, Given("m", OURS)] = 0.02
+"""Balls that make room lie at least this far above others, and no ball starts closer to the tool."""
 
-CLOCK = Clock(steps=TABLE.control_steps_per_action, period=1.0 / 30.0)
-"""Physics steps per control step (paper, table of scoop), each of 1/30 s (ours)."""
-ITERATIONS = 8
-"""Of the contact solver in every physics step (ours)."""
-MAX_BALL_SPEED = 12.0
-"""No ball is ever faster, m/s (ours), and none is hit deeper than it moves in a physics step; a million random control
-steps saw 10.3 m/s and 0.35 m."""
-SLOP = 0.02
-"""Overlap of two bodies that the contact solver leaves alone, m (ours)."""
+HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 30
+"""Time limit."""
+STEPS_PER_CONTROL: Annotated[int, Given("physics steps", PAPER, "control_steps_per_action")] = 5
+"""In a control step."""
+PHYSICS_PERIOD: Annotated[float, Given("s", OURS)] = 1.0 / 30.0
+"""Of a physics step."""
+CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
+ITERATIONS: Annotated[int, Given("1", OURS)] = 8
+"""Of the contact solver in every physics step."""
+MAX_BALL_SPEED: Annotated[float, Given("m/s", OURS)] = 12.0
+"""No ball is ever faster, and none is hit deeper than it moves in a physics step; a million random control steps saw
+10.3 m/s and 0.35 m."""
+SLOP: Annotated[float, Given("m", OURS)] = 0.02
+"""Overlap of two bodies that the contact solver leaves alone."""
 
 
 CONTROL = Box.of(
@@ -234,11 +253,10 @@ class Scoop(Task):
 
     name = "scoop"
     title = "Scoop"
-    horizon = TABLE.max_episode_steps
+    scene: ClassVar = constants(__name__)
+    horizon = HORIZON
     control_period = CLOCK.control_period
-    design_space = chain_design_space(
-        TABLE.tool_length_init, TABLE.tool_length_ratio, TABLE.tool_angle_scale, TABLE.tool_angle_ratio
-    )
+    design_space = chain_design_space(LENGTH_INIT, LENGTH_RATIO, ANGLE_SCALE, ANGLE_RATIO)
     tool_graph = CHAIN_GRAPH
     control_space = CONTROL
     instance_space = INSTANCE
@@ -248,7 +266,7 @@ class Scoop(Task):
         "progress": f"change of h (min(1 + k, 1 + n) / max(1 + k, 1 + n))^{NUMBER_EXPONENT:g}, h the share of the way "
         f"from y = {TOOL_START[1]:g} m to {CEILING:g} m by which the tool's lowest point has been lifted, k the number "
         "of balls vertically above the tool, n the wanted number",
-        "slack": f"{TABLE.slack_reward:g}",
+        "slack": f"{SLACK_REWARD:g}",
         "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
     }
     success_conditions: ClassVar = {
@@ -382,7 +400,7 @@ class _ScoopSimulator(PlanarSimulator):
         self.set_reward(
             slots,
             progress=self.progress[slots] - before,
-            slack=TABLE.slack_reward,
+            slack=SLACK_REWARD,
             success=SUCCESS_REWARD * self.success[slots],
         )
 

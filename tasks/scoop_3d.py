@@ -6,17 +6,18 @@ Shapes: `b` slots a call names, `I` = 2 instance (balls wanted, pile), `D` = 10 
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pybullet
 
-from codesign_bench.studies.corl2023.scenes import BOX_SCENES
 from codesign_bench.task import (
+    OURS,
     Behaviour,
     Booleans,
     Box,
     Floats,
+    Given,
     Physics,
     Quantity,
     Simulator,
@@ -25,9 +26,11 @@ from codesign_bench.task import (
     Task,
     ToolGraph,
     ToolPart,
+    constants,
 )
 
 from ._bullet import (
+    BULLET_SCENE,
     LEVEL,
     MAX_SLOTS,
     PLACE,
@@ -36,85 +39,123 @@ from ._bullet import (
     BulletSimulator,
     Camera,
     Marks,
+    Triple,
     box_parts,
     rotation_matrices,
     rotations_about,
 )
 from ._scene import COLOURS, Clock
 
-TABLE = BOX_SCENES["scoop_3d"]
+PAPER = "paper, table of 3D scoop"
+TEXT = 'paper, appendix "Environment Details"'
 
-BALLS = 40
-"""Balls in the reservoir (paper)."""
-WANTED = (1, 7)
-"""Fewest and most balls that are wanted (paper)."""
+BALLS: Annotated[int, Given("balls", TEXT)] = 40
+"""In the reservoir."""
+WANTED: Annotated[tuple[int, int], Given("balls", TEXT)] = (1, 7)
+"""Fewest and most balls that are wanted."""
 
-HALF_THICKNESS = TABLE.box_dimensions_min[1]
-"""Of a plate, m (paper, table of scoop 3D; we read its box dimensions as half extents, as PyBullet does)."""
-HANDLE_HALF_EXTENTS = (0.01, HALF_THICKNESS, 0.1)
-"""Of the handle, m (ours)."""
-HANDLE_LEAN = np.deg2rad(30.0)
-"""The handle leans outwards by this from the back plate, rad (ours): it never passes over the opening."""
+BOX_MIN: Annotated[Triple, Given("m", PAPER, "box_dimensions_min")] = (0.04, 0.005, 0.02)
+"""Smallest width, thickness and height of a plate, read as half extents, as PyBullet does (our reading)."""
+BOX_MAX: Annotated[Triple, Given("m", PAPER, "box_dimensions_max")] = (0.08, 0.005, 0.05)
+"""Largest width, thickness and height of a plate, read as half extents (our reading)."""
+HALF_THICKNESS = BOX_MIN[1]
+"""Of a plate, m: the paper's smallest and largest are the same."""
+ANGLE_MIN: Annotated[float, Given("degrees", PAPER, "tool_angle_min")] = -15.0
+"""How far a side plate leans outwards at least."""
+ANGLE_MAX: Annotated[float, Given("degrees", PAPER, "tool_angle_max")] = 15.0
+"""How far a side plate leans outwards at most."""
+HANDLE_HALF_EXTENTS: Annotated[Triple, Given("m", OURS)] = (0.01, HALF_THICKNESS, 0.1)
+"""Of the handle."""
+HANDLE_LEAN: Annotated[float, Given("rad", OURS)] = np.deg2rad(30.0)
+"""The handle leans outwards by this from the back plate: it never passes over the opening."""
+TOOL_MASS: Annotated[float, Given("kg", OURS)] = 0.2
+"""Of the tool."""
+PUSH_FORCE: Annotated[float, Given("N", OURS)] = 20.0
+"""Largest force of a sliding joint of the gantry."""
+TURN_TORQUE: Annotated[float, Given("N m", OURS)] = 2.0
+"""Largest torque of a turning joint of the gantry."""
 
-BALL_RADIUS = 0.029
-"""m (ours): tools hold 1 ball to 15."""
-BALL_MASS = 0.05
-"""kg (ours)."""
-FRICTION = 0.3
+BALL_RADIUS: Annotated[float, Given("m", OURS)] = 0.029
+"""Of a ball: tools hold 1 ball to 15."""
+BALL_MASS: Annotated[float, Given("kg", OURS)] = 0.05
+"""Of a ball."""
+FRICTION: Annotated[float, Given("1", OURS)] = 0.3
 """Of balls, plates, walls and floor; PyBullet multiplies the frictions of a contact's two bodies, so a contact's is
-0.09 (ours): slippery balls do not pile up beyond the rim."""
-LINEAR_DAMPING = 0.1
-"""Share of its speed that a ball loses in a second (ours)."""
-ANGULAR_DAMPING = 0.5
-"""Share of its spin that a ball loses in a second (ours)."""
-RESERVOIR = (0.22, 0.255)
-"""Half the inner size of the reservoir along x and y, m (ours): a ball passes between any tool and a wall."""
-WALL_HEIGHT = 0.1
-"""m (ours)."""
-WALL_HALF_THICKNESS = 0.01
-"""m (ours)."""
+0.09: slippery balls do not pile up beyond the rim."""
+TOOL_FRICTION: Annotated[float, Given("1", OURS)] = FRICTION
+"""Of the tool's surface."""
+LINEAR_DAMPING: Annotated[float, Given("1/s", OURS)] = 0.1
+"""Share of its speed that a ball loses in a second."""
+ANGULAR_DAMPING: Annotated[float, Given("1/s", OURS)] = 0.5
+"""Share of its spin that a ball loses in a second."""
+RESERVOIR: Annotated[tuple[float, float], Given("m", OURS)] = (0.22, 0.255)
+"""Half the inner size of the reservoir along x and y: a ball passes between any tool and a wall."""
+WALL_HEIGHT: Annotated[float, Given("m", OURS)] = 0.1
+"""Of the reservoir's walls."""
+WALL_HALF_THICKNESS: Annotated[float, Given("m", OURS)] = 0.01
+"""Of the reservoir's walls."""
 FLOOR_PICTURE = (1.0, 1.0, 0.01)
 """Half extents of what is drawn of the endless floor, m (ours)."""
 FLOOR_COLOUR = "#e4e6ea"
 """What the floor is drawn in (ours)."""
-LINE = 0.13
-"""A tool that is nowhere lower than this is clear of the reservoir, m (ours)."""
+LINE: Annotated[float, Given("m", OURS)] = 0.13
+"""A tool that is nowhere lower than this is clear of the reservoir."""
 
-FLOOR_CLEARANCE = 0.004
-"""Between floor and bottom plate at the start, and least ever, m (ours)."""
-TOOL_START = (TABLE.tool_position_init[0], TABLE.tool_position_init[1], FLOOR_CLEARANCE + HALF_THICKNESS)
-"""Where the middle of the bottom plate starts, m: x and y are the paper's; the paper's z of 0.1 m is above the balls,
-ours is among them."""
-REACH = (0.03, 0.03)
-"""The tool moves no further than this from its start along x and y, m (ours)."""
-HIGHEST = 0.2
-"""Highest place of the middle of the bottom plate, m (ours)."""
-LARGEST_TURN = (0.25, 0.25, 0.3)
-"""Largest turns about x, y and z, rad (ours): the tool cannot be tipped out, so that its shape decides the count."""
-CONTROL_SCALE = 0.015
-"""From the paper's control bounds to a change of pose in a control step, m and rad (ours): 0.45 m/s and 0.71 rad/s. The
-paper's 0.05 would be 1.5 m/s and 2.4 rad/s, at which balls are thrown about."""
+FLOOR_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.004
+"""Between floor and bottom plate at the start, and least ever."""
+TOOL_START: Annotated[Triple, Given("m", f"{PAPER}; z ours", "tool_position_init")] = (
+    0.0,
+    0.05,
+    FLOOR_CLEARANCE + HALF_THICKNESS,
+)
+"""Where the middle of the bottom plate starts: the paper's z is above the balls, ours is among them."""
+REACH: Annotated[tuple[float, float], Given("m", OURS)] = (0.03, 0.03)
+"""The tool moves no further than this from its start along x and y."""
+HIGHEST: Annotated[float, Given("m", OURS)] = 0.2
+"""Highest place of the middle of the bottom plate."""
+LARGEST_TURN: Annotated[Triple, Given("rad", OURS)] = (0.25, 0.25, 0.3)
+"""Largest turns about x, y and z: the tool cannot be tipped out, so that its shape decides the count."""
+CONTROL_MIN: Annotated[tuple[float, ...], Given("1", PAPER, "control_action_min")] = (-1.0,) * 3 + (-1.57,) * 3
+"""Lower bounds of a control along and about x, y and z, before scaling."""
+CONTROL_MAX: Annotated[tuple[float, ...], Given("1", PAPER, "control_action_max")] = (1.0,) * 3 + (1.57,) * 3
+"""Upper bounds of a control, before scaling."""
+CONTROL_SCALE: Annotated[float, Given("m, rad", OURS, "control_action_scale")] = 0.015
+"""From these bounds to a change of pose in a control step: 0.45 m/s and 0.71 rad/s. The paper's scale would be 1.5 m/s
+and 2.4 rad/s, at which balls are thrown about."""
 
-POUR_COLUMNS = 3
-"""Balls that lie where the tool will are poured on it in layers of this many by this many (ours)."""
-POUR_GAP = 0.004
-"""Between balls before they are poured, m (ours)."""
-SETTLING_STEPS = 16
-"""Control steps for which poured balls come to rest before the first control (ours)."""
+POUR_COLUMNS: Annotated[int, Given("balls", OURS)] = 3
+"""Balls that lie where the tool will are poured on it in layers of this many by this many."""
+POUR_GAP: Annotated[float, Given("m", OURS)] = 0.004
+"""Between balls before they are poured."""
+SETTLING_STEPS: Annotated[int, Given("control steps", OURS)] = 16
+"""For which poured balls come to rest before the first control."""
 
-HELD_SPEED = 0.5
-"""A held ball moves no faster than this in the frame of the tool, m/s (ours)."""
-HELD_STEPS = 6
-"""Control steps in a row for which the wanted number must be held (ours)."""
-LOST_STEPS = 30
-"""Control steps that a tool may be clear of the reservoir without success (ours)."""
-PROGRESS_REWARD = 5.0
-"""Scale of the potential (ours); success earns the paper's 10."""
-CLOSENESS_POWER = 1.5
-"""How much a wrong count costs (ours)."""
+HELD_SPEED: Annotated[float, Given("m/s", OURS)] = 0.5
+"""A held ball moves no faster than this in the frame of the tool."""
+HELD_STEPS: Annotated[int, Given("control steps", OURS)] = 6
+"""How long in a row the wanted number must be held."""
+LOST_STEPS: Annotated[int, Given("control steps", OURS)] = 30
+"""For which a tool may be clear of the reservoir without success."""
+PROGRESS_REWARD: Annotated[float, Given("1", OURS)] = 5.0
+"""Scale of the potential."""
+CLOSENESS_POWER: Annotated[float, Given("1", OURS)] = 1.5
+"""How much a wrong count costs."""
+SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
+"""Added in every control step."""
+SUCCESS_REWARD: Annotated[float, Given("1", PAPER, "success_reward")] = 10.0
+"""Added once, when the wanted number is held."""
 
-CLOCK = Clock(steps=4, period=1.0 / 120.0)
-"""Four physics steps per control step (ours; the paper has ten), s."""
+HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 100
+"""Time limit."""
+STEPS_PER_CONTROL: Annotated[int, Given("physics steps", OURS, "control_steps_per_action")] = 4
+"""In a control step."""
+PHYSICS_PERIOD: Annotated[float, Given("s", OURS)] = 1.0 / 120.0
+"""Of a physics step."""
+CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
+SOLVER_ITERATIONS: Annotated[int, Given("1", OURS)] = 10
+"""Of the contact solver in every physics step."""
+CONTACT_CORRECTION: Annotated[float, Given("1", OURS)] = 0.5
+"""Share of an overlap that a physics step takes away."""
 
 SIDES = ("back", "front", "left", "right")
 BACK = SIDES.index("back")
@@ -124,18 +165,13 @@ OUTWARDS = np.array([[0.0, -1.0], [0.0, 1.0], [-1.0, 0.0], [1.0, 0.0]])
 """(P, 2) where the side plates stand, seen from the middle of the bottom plate."""
 
 
+(_WIDTH, _, _HEIGHT) = ((2.0 * low, 2.0 * high, "m") for low, high in zip(BOX_MIN, BOX_MAX, strict=True))
+_ANGLE = (float(np.deg2rad(ANGLE_MIN)), float(np.deg2rad(ANGLE_MAX)), "rad")
 DESIGN = Box.of(
-    bottom_width=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
-    bottom_length=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
-    **{f"{side}_height": (2.0 * TABLE.box_dimensions_min[2], 2.0 * TABLE.box_dimensions_max[2], "m") for side in SIDES},
-    **{
-        f"{side}_angle": (
-            float(np.deg2rad(TABLE.tool_angle_min[0])),
-            float(np.deg2rad(TABLE.tool_angle_max[0])),
-            "rad",
-        )
-        for side in SIDES
-    },
+    bottom_width=_WIDTH,
+    bottom_length=_WIDTH,
+    **{f"{side}_height": _HEIGHT for side in SIDES},
+    **{f"{side}_angle": _ANGLE for side in SIDES},
 )
 BOTTOM_WIDTH, BOTTOM_LENGTH = DESIGN.index("bottom_width"), DESIGN.index("bottom_length")
 BOTTOM = DESIGN.slice("bottom_width", "bottom_length")
@@ -144,8 +180,8 @@ HEIGHTS, ANGLES = (DESIGN.slice(*(f"{side}_{what}" for side in SIDES)) for what 
 
 CONTROL = Box(
     names=("move_x", "move_y", "move_z", "turn_x", "turn_y", "turn_z"),
-    low=tuple(CONTROL_SCALE * bound for bound in TABLE.control_action_min),
-    high=tuple(CONTROL_SCALE * bound for bound in TABLE.control_action_max),
+    low=tuple(CONTROL_SCALE * bound for bound in CONTROL_MIN),
+    high=tuple(CONTROL_SCALE * bound for bound in CONTROL_MAX),
     units=("m", "m", "m", "rad", "rad", "rad"),
 )
 MOVE_UP, TURNS = CONTROL.index("move_z"), CONTROL.group("turn_")
@@ -253,7 +289,8 @@ class Scoop3D(Task):
 
     name = "scoop_3d"
     title = "Scoop (3D)"
-    horizon = TABLE.max_episode_steps
+    scene: ClassVar = {**BULLET_SCENE, **constants(__name__)}
+    horizon = HORIZON
     control_period = CLOCK.control_period
     design_space = DESIGN
     tool_graph = ToolGraph(
@@ -267,8 +304,8 @@ class Scoop3D(Task):
         "progress": f"change of {PROGRESS_REWARD:g} h (min(k + 1, n + 1) / max(k + 1, n + 1))^{CLOSENESS_POWER:g}, h "
         "the share of the way from the start to the line by which the bottom plate's lowest point has been lifted, k "
         "the number of balls in or above the tool, n the wanted number",
-        "slack": f"{TABLE.slack_reward:g}",
-        "success": f"{TABLE.success_reward:g} in the step that solves the task",
+        "slack": f"{SLACK_REWARD:g}",
+        "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
     }
     success_conditions: ClassVar = {
         "clear": f"the bottom plate is nowhere lower than {LINE:g} m",
@@ -324,12 +361,12 @@ class _ScoopSimulator(BulletSimulator):
     camera = Camera(eye=(0.75, -0.75, 0.65), target=(0.0, 0.03, 0.08), field_of_view=40.0)
     room = ((-3.0, 3.0), (-3.0, 3.0), (0.0, 0.6))
     turning_axes = (0, 1, 2)
-    push_force = 20.0
-    turn_torque = 2.0
-    tool_mass = 0.2
-    contact_correction = 0.5
-    tool_friction = FRICTION
-    solver_iterations = 10
+    push_force = PUSH_FORCE
+    turn_torque = TURN_TORQUE
+    tool_mass = TOOL_MASS
+    contact_correction = CONTACT_CORRECTION
+    tool_friction = TOOL_FRICTION
+    solver_iterations = SOLVER_ITERATIONS
 
     def __init__(self, num_slots: int, state_size: int, clock: Clock, settling_steps: int) -> None:
         super().__init__(num_slots, state_size, num_bodies=BALLS, clock=clock)
@@ -440,8 +477,8 @@ class _ScoopSimulator(BulletSimulator):
         self.set_reward(
             slots,
             progress=potential - self.potential[slots],
-            slack=TABLE.slack_reward,
-            success=TABLE.success_reward * self.success[slots],
+            slack=SLACK_REWARD,
+            success=SUCCESS_REWARD * self.success[slots],
         )
         self.potential[slots] = potential
         self.outcome[slots] = held

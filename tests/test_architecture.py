@@ -70,9 +70,9 @@ def test_methods_know_no_task_and_no_figure() -> None:
     assert offences(files("methods"), below("tasks", "paper_figs", "sweep", "storage", "cli")) == []
 
 
-def test_tasks_know_no_method_and_nothing_of_learning() -> None:
-    forbidden = (*below("methods", "paper_figs", "learning", "method", "sweep", "storage", "cli"), "torch", "cma")
-    assert offences(files("tasks"), forbidden) == []
+def test_tasks_know_no_method_no_study_and_nothing_of_learning() -> None:
+    forbidden = below("methods", "paper_figs", "learning", "method", "sweep", "storage", "cli", "studies", "deployment")
+    assert offences(files("tasks"), (*forbidden, "torch", "cma")) == []
 
 
 def test_figures_are_drawn_from_results_alone() -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -17,11 +17,12 @@ from codesign_bench.errors import UserError
 from codesign_bench.seeding import generator
 from codesign_bench.task.behaviour import Behaviour
 from codesign_bench.task.robot import DeploymentSpec
+from codesign_bench.task.scene import Constant
 from codesign_bench.task.simulator import Simulator, Soundness
 from codesign_bench.task.spaces import Booleans, Box, Floats, Layout, Quantity
 from codesign_bench.task.tool import ToolGraph, ToolPart
 
-NOTHING_NAMED: Mapping[str, str] = MappingProxyType({})
+NOTHING_NAMED: Mapping[str, Any] = MappingProxyType({})
 EVALUATION_SEED = 20231106
 """Seed of every task's fixed evaluation instances; training never uses it (ours)."""
 
@@ -61,6 +62,8 @@ class Task(ABC):
     """Control steps in a row for which all of these conditions must hold."""
     failure_condition: ClassVar[str] = ""
     """When an episode is lost for good, in words with units; empty: never."""
+    scene: ClassVar[Mapping[str, Constant]] = NOTHING_NAMED
+    """Name -> number, with unit and source, of what the scene is made of: `constants(__name__)`."""
     outcome: ClassVar[Quantity | None] = None
     """What `Simulator.outcome` measures: how far the task got, whatever the reward."""
     soundness: ClassVar[Soundness | None] = None

@@ -89,7 +89,7 @@ def test_the_docstring_tells_the_constants() -> None:
         ),
         "Goal space": (f"{near:g} to {far:g} m",),
         "Reward": (
-            f"/ {catch.NUM_BALLS} - {-catch.TABLE.slack_reward:g} per control step",
+            f"/ {catch.NUM_BALLS} - {-catch.SLACK_REWARD:g} per control step",
             f"+{catch.SUCCESS_REWARD:g} on success",
             f"{catch.PILE_HEIGHT:g} m",
             f"{catch.SLOW:g} m/s",
@@ -217,7 +217,7 @@ def test_an_episode_ends_once_one_ball_is_lost_and_the_others_are_caught() -> No
 @pytest.mark.parametrize("landing", [2.5, -2.5, 0.3])
 def test_rewards_add_up_to_the_balls_held_at_the_end(landing: float) -> None:
     outcome = play(throw(landing, offset=1.0), RIGHT)
-    expected = outcome.held[-1] / catch.NUM_BALLS + catch.TABLE.slack_reward * len(outcome.reward)
+    expected = outcome.held[-1] / catch.NUM_BALLS + catch.SLACK_REWARD * len(outcome.reward)
     assert sum(outcome.reward) == pytest.approx(expected + catch.SUCCESS_REWARD * outcome.success)
 
 

@@ -21,7 +21,6 @@ import pytest
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.registry import load_module
-from codesign_bench.studies.corl2023.protocol import PROTOCOL
 from codesign_bench.task import Behaviour, Floats, Singles, load_task
 from codesign_bench.task.episodes import Episodes
 
@@ -97,7 +96,7 @@ def test_the_docstring_tells_the_constants() -> None:
     task = load_task("fetch_cube")
     text = inspect.cleandoc(str(task.__doc__))
     sections = {title: " ".join(body.split()) for title, body in SECTION.findall(text)}
-    (x_low, x_high), (y_low, y_high), state, table = fetch.CUBE_X, fetch.CUBE_Y, task.state_space, fetch.TABLE
+    (x_low, x_high), (y_low, y_high), state = fetch.CUBE_X, fetch.CUBE_Y, task.state_space
     sizes = [f"{low:g} to {high:g} m" for low, high in fetch.SIZES]
     for title, numbers in {
         "Action space": (*sizes, f"+-{np.rad2deg(fetch.ANGLES[1]):g} degrees", f"{fetch.STEP_LENGTH:g} m in the plane"),
@@ -105,8 +104,8 @@ def test_the_docstring_tells_the_constants() -> None:
         "Goal space": (f"[{x_low:g}, {x_high:g}] x [{y_low:g}, {y_high:g}] m", f"{fetch.PAPER_ORIGIN:g} m - y"),
         "Reward": (
             f"{fetch.PROGRESS_WEIGHT:g} (d_before - d_after)",
-            f"{-table.slack_reward:g} per control step",
-            f"+{table.success_reward:g} on success",
+            f"{-fetch.SLACK_REWARD:g} per control step",
+            f"+{fetch.SUCCESS_REWARD:g} on success",
         ),
         "Starting state": ("({:g}, {:g}, {:g}) m".format(*fetch.HOLD_START), f"{fetch.START_CLEARANCE:g} m"),
         "Episode end": (
@@ -143,16 +142,10 @@ def test_no_cube_starts_where_it_counts_as_fetched() -> None:
     assert np.linalg.norm(starts, axis=1).min() > fetch.GOAL_DISTANCE
 
 
-def test_the_papers_patches_are_the_cutout_of_six_tenths() -> None:
-    task, inside = load_task("fetch_cube"), 0.002
-    for patch in PROTOCOL.fetch_cube_patches:
-        for sign, expected in ((1.0, True), (-1.0, False)):
-            (x_low, x_high), (y_low, y_high) = patch.x, patch.y
-            shift = sign * inside
-            corners = product((x_low + shift, x_high - shift), (y_low + shift, y_high - shift))
-            starts = np.array([(x, fetch.PAPER_ORIGIN - y) for x, y in corners])
-            assert (task.in_cutout(starts, 0.6) == expected).all()
-    assert not task.in_cutout(np.array([[0.0, 0.65]]), 0.9).any(), "between the patches"
+def test_the_cutout_is_two_patches_with_a_gap_between_them() -> None:
+    task, middle = load_task("fetch_cube"), 0.5 * sum(fetch.CUBE_Y)
+    assert task.in_cutout(np.array([[-0.2, middle], [0.2, middle]]), 0.5).all()
+    assert not task.in_cutout(np.array([[0.0, middle]]), 0.9).any(), "between the patches"
 
 
 def test_material_by_hand() -> None:
@@ -208,8 +201,8 @@ def test_a_hook_behind_the_cube_fetches_it_with_one_pull() -> None:
     assert outcome.success
     # The hook's near side must move from 0.69 to half a cube behind the goal's edge, 0.02 m in a step.
     assert len(outcome.reward) == pytest.approx((0.69 - (fetch.GOAL_DISTANCE + HALF)) / fetch.STEP_LENGTH, abs=2)
-    assert outcome.reward[-1] > 0.9 * fetch.TABLE.success_reward
-    assert max(outcome.reward[:-1]) < 0.1 * fetch.TABLE.success_reward
+    assert outcome.reward[-1] > 0.9 * fetch.SUCCESS_REWARD
+    assert max(outcome.reward[:-1]) < 0.1 * fetch.SUCCESS_REWARD
     assert outcome.distances[-1] < fetch.GOAL_DISTANCE < outcome.distances[-2]
 
 
@@ -232,7 +225,7 @@ def test_nothing_happens_to_an_idle_tool() -> None:
     np.testing.assert_allclose(outcome.cube[-1][:3], outcome.cube[0][:3], atol=1e-4)
     np.testing.assert_allclose(outcome.hold[-1], outcome.hold[0], atol=1e-4)
     horizon = load_task("fetch_cube").horizon
-    assert sum(outcome.reward) == pytest.approx(horizon * fetch.TABLE.slack_reward, abs=1e-3)
+    assert sum(outcome.reward) == pytest.approx(horizon * fetch.SLACK_REWARD, abs=1e-3)
 
 
 @pytest.mark.parametrize(("control", "tool"), [(PULL, HOOK), (SIDEWAYS, STRAIGHT), (SIDEWAYS, HOOK)])
@@ -240,8 +233,8 @@ def test_rewards_add_up_to_the_way_made(control: Floats, tool: Floats) -> None:
     outcome = play(started((0.02, 0.62), tool), control)
     way = outcome.distances[0] - outcome.distances[-1]
     assert abs(way) > 0.01, "the cube was moved"
-    expected = fetch.PROGRESS_WEIGHT * way + fetch.TABLE.slack_reward * len(outcome.reward)
-    expected += fetch.TABLE.success_reward * outcome.success
+    expected = fetch.PROGRESS_WEIGHT * way + fetch.SLACK_REWARD * len(outcome.reward)
+    expected += fetch.SUCCESS_REWARD * outcome.success
     assert sum(outcome.reward) == pytest.approx(expected, abs=1e-9)
 
 

@@ -125,8 +125,8 @@ def test_the_docstring_tells_the_constants() -> None:
         ),
         "Goal space": (f"{goals.low[0]:g} to {goals.high[0]:g}", f"{goals.low[1]:g} to {goals.high[1]:g}", "0.18 m"),
         "Reward": (
-            f"{lift.LIFT_WEIGHT:g} h - {lift.FIT_WEIGHT:g} d + f - {-lift.TABLE.slack_reward:g} per control step",
-            f"+{lift.TABLE.success_reward:g} on success",
+            f"{lift.LIFT_WEIGHT:g} h - {lift.FIT_WEIGHT:g} d + f - {-lift.SLACK_REWARD:g} per control step",
+            f"+{lift.SUCCESS_REWARD:g} on success",
             f"exp(-distance / {lift.FIT_LENGTH:g} m)",
             f"{1000.0 * lift.PLAY:g} mm",
             f"starts at {lift.START_POTENTIAL:g}",
@@ -223,7 +223,7 @@ def test_prongs_under_the_rim_lift_a_cup_and_others_do_not(cup: tuple[float, flo
     fits = play(cup, fork(cup, 0.5 * lift.RIM_WIDTH))
     assert fits.success
     assert fits.simulator.outcome[0] > lift.SUCCESS_HEIGHT
-    assert sum(fits.reward) > lift.TABLE.success_reward + lift.LIFT_WEIGHT * lift.SUCCESS_HEIGHT
+    assert sum(fits.reward) > lift.SUCCESS_REWARD + lift.LIFT_WEIGHT * lift.SUCCESS_HEIGHT
     assert not play(cup, fork(cup, -0.005)).success, "too close together for the walls"
     if cup != WIDE:  # No fork is too wide for the widest cup.
         assert not play(cup, fork(cup, lift.RIM_WIDTH + 0.005)).success, "too wide for the rim"
@@ -283,7 +283,7 @@ def test_rewards_add_up_to_the_potential_reached() -> None:
     for clearance in (0.5 * lift.RIM_WIDTH, -0.01):
         outcome = play(MIDDLE, fork(MIDDLE, clearance))
         reached = outcome.simulator.potential[0] - lift.START_POTENTIAL
-        expected = reached + lift.TABLE.slack_reward * len(outcome.reward) + 10.0 * outcome.success
+        expected = reached + lift.SLACK_REWARD * len(outcome.reward) + 10.0 * outcome.success
         assert sum(outcome.reward) == pytest.approx(expected, abs=1e-9)
         assert sum(outcome.reward) < 16.0
 

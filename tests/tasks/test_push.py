@@ -139,7 +139,7 @@ def test_the_docstring_tells_the_constants() -> None:
             f"| {goals.low[0]:g} .. {goals.high[0]:g} and {goals.low[1]:g} .. {goals.high[1]:g} |",
         ),
         "Goal space": (f"{near:g} to {far:g} m",),
-        "Reward": (f"{-push.TABLE.slack_reward:g} per control step", f"+{push.SUCCESS_REWARD:g} on success"),
+        "Reward": (f"{-push.SLACK_REWARD:g} per control step", f"+{push.SUCCESS_REWARD:g} on success"),
         "Starting state": (
             "({:g}, {:g})".format(*push.PUCK_START),
             "({:g}, {:g})".format(*push.TOOL_START),
@@ -235,7 +235,7 @@ def test_nothing_happens_to_an_idle_tool() -> None:
     assert not outcome.terminated
     assert len(outcome.reward) == task.horizon
     np.testing.assert_allclose(outcome.puck[-1], push.PUCK_START, atol=1e-9)
-    assert sum(outcome.reward) == pytest.approx(task.horizon * push.TABLE.slack_reward)
+    assert sum(outcome.reward) == pytest.approx(task.horizon * push.SLACK_REWARD)
 
 
 def speed_for(distance: float) -> float:
@@ -270,7 +270,7 @@ def test_rewards_add_up_to_the_share_of_the_way_made(prepare: Callable[[pymunk.S
     outcome = play(goal, push_left, prepare)
     first, last = (float(np.linalg.norm(puck - goal[0])) for puck in (outcome.puck[0], outcome.puck[-1]))
     steps = len(outcome.reward)
-    expected = (first - last) / first + push.TABLE.slack_reward * steps + push.SUCCESS_REWARD * outcome.success
+    expected = (first - last) / first + push.SLACK_REWARD * steps + push.SUCCESS_REWARD * outcome.success
     assert sum(outcome.reward) == pytest.approx(expected, abs=1e-9)
 
 

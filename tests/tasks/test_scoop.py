@@ -98,7 +98,7 @@ def test_the_docstring_tells_the_constants() -> None:
         "Goal space": (f"{few} to {many} balls of {scoop.NUM_BALLS}",),
         "Reward": (
             f"^{scoop.NUMBER_EXPONENT:g}",
-            f"{-scoop.TABLE.slack_reward:g} per control step",
+            f"{-scoop.SLACK_REWARD:g} per control step",
             f"from y = {scoop.TOOL_START[1]:g} m to {scoop.CEILING:g} m",
             f"+{scoop.SUCCESS_REWARD:g} on success",
         ),
@@ -282,7 +282,7 @@ def test_an_idle_tool_lifts_nothing_and_loses_nothing() -> None:
     assert truncated[0]
     assert not episodes.success(SLOT)[0]
     assert episodes.simulator.outcome[0] == 0.0
-    assert sum(rewards) == pytest.approx(len(rewards) * scoop.TABLE.slack_reward, abs=0.02)
+    assert sum(rewards) == pytest.approx(len(rewards) * scoop.SLACK_REWARD, abs=0.02)
     simulator: Any = episodes.simulator
     balls = simulator.bodies[0, : scoop.NUM_BALLS]
     assert balls[:, 1].max() < scoop.RIM
@@ -305,7 +305,7 @@ def test_rewards_add_up_to_the_progress_made(wanted: int) -> None:
     number = ((1.0 + min(held, wanted)) / (1.0 + max(held, wanted))) ** scoop.NUMBER_EXPONENT
     success = scoop.SUCCESS_REWARD * bool(episodes.success(SLOT)[0])
     assert held > 0.0
-    assert total == pytest.approx(lift * number + steps * scoop.TABLE.slack_reward + success, abs=1e-6)
+    assert total == pytest.approx(lift * number + steps * scoop.SLACK_REWARD + success, abs=1e-6)
 
 
 def test_the_script_scoops_most_numbers_with_its_own_tools_and_few_with_one() -> None:

@@ -68,7 +68,7 @@ def test_the_docstring_tells_the_constants() -> None:
             f"{space.low[2]:g} to {space.high[2]:g} m",
             f"+-{np.rad2deg(space.high[6]):g} degrees",
             f"{2.0 * scoop.HALF_THICKNESS:g} m thick",
-            f"{scoop.CONTROL_SCALE:g} times +-{scoop.TABLE.control_action_max[5]:g}",
+            f"{scoop.CONTROL_SCALE:g} times +-{scoop.CONTROL_MAX[5]:g}",
             "{:g}, {:g} and {:g} rad".format(*scoop.LARGEST_TURN),
         ),
         "Observation": (
@@ -80,8 +80,8 @@ def test_the_docstring_tells_the_constants() -> None:
         "Goal space": (f"from {scoop.WANTED[0]} to {scoop.WANTED[1]}",),
         "Reward": (
             f"change of {scoop.PROGRESS_REWARD:g} h c",
-            f"{-scoop.TABLE.slack_reward:g} per control step",
-            f"+ {scoop.TABLE.success_reward:g} on success",
+            f"{-scoop.SLACK_REWARD:g} per control step",
+            f"+ {scoop.SUCCESS_REWARD:g} on success",
             f"^{scoop.CLOSENESS_POWER:g}",
         ),
         "Starting state": (
@@ -201,8 +201,8 @@ def test_the_right_number_held_for_long_enough_is_a_success() -> None:
     assert episodes.success(SLOT).all()
     assert episodes.simulator.outcome[0] == 5
     assert episodes.simulator.state[0, scoop.HELD_SHARE] == 1.0
-    assert rewards[-1] > 0.9 * scoop.TABLE.success_reward
-    assert max(rewards[:-1]) < 0.5 * scoop.TABLE.success_reward
+    assert rewards[-1] > 0.9 * scoop.SUCCESS_REWARD
+    assert max(rewards[:-1]) < 0.5 * scoop.SUCCESS_REWARD
 
 
 def test_a_wrong_number_fails_after_a_while_above_the_line() -> None:
@@ -246,7 +246,7 @@ def test_rewards_add_up_to_the_documented_potential() -> None:
     episodes = started(3, tool_for(6))
     rewards, _ = lift_to_the_end(episodes)
     few, many = sorted((episodes.simulator.state[0, scoop.BALLS_ABOVE] + 1.0, 4.0))
-    expected = scoop.PROGRESS_REWARD * (few / many) ** scoop.CLOSENESS_POWER + scoop.TABLE.slack_reward * len(rewards)
+    expected = scoop.PROGRESS_REWARD * (few / many) ** scoop.CLOSENESS_POWER + scoop.SLACK_REWARD * len(rewards)
     assert sum(rewards) == pytest.approx(expected, abs=1e-6)
 
 

@@ -151,49 +151,41 @@ BALL_BODIES, TOOL_BODY = slice(0, NUM_BALLS), NUM_BALLS
 class CatchBalls(Task):
     """Catch three balls that fall from the sky (paper, appendix "Environment Details").
 
-    Seen from the side. The hand moves along a rail. Its tool is a chain of three links; the first hangs down from the
-    hand, the other two can be turned to the left or to the right of it and so make a pan on that side. The balls are
-    thrown and come down around one place on the left or on the right of the hand. The hand is too slow to bring a pan
-    from one side to the other before they arrive, so a tool that catches on one side hardly catches on the other; how
-    far away the balls come down decides how long the links must be, or how far the hand must move.
+    Seen from the side, a hand moves along a rail and holds a chain of three links; the first hangs down from it, the
+    other two can be turned to the left or to the right and so make a pan on that side. The balls are thrown and come
+    down around one place to the left or to the right of the hand. The hand is too slow to bring a pan from one side to
+    the other before they arrive, so a tool that catches on one side hardly catches on the other. How far away the balls
+    come down decides how long the links must be, or how far the hand must move.
 
     Action space
-        Design, 5: lengths of three links, 1 to 6 m and twice 0.5 to 3 m, and the two angles between them, +-60 degrees
-        (paper, table of catch balls). Control, 1: velocity of the hand along x (paper), +-1 m/s (ours), which changes
-        by at most 10 m/s^2 (ours).
+        Design, 5: lengths of the three links (m) and the two angles between them (rad) (paper). Control, 1: velocity of
+        the hand along x (m/s) (paper; range ours); the hand's acceleration is limited (ours).
 
     Observation
-        | index | what | unit | range |
-        | --- | --- | --- | --- |
-        | 0 | hand's position x | m | 15 .. 25 |
-        | 1 | hand's velocity | m/s | -1 .. 1 |
-        | 2-6, 7-11, 12-16 | for each ball: from hand to ball x, y | m | -25 .. 25 |
-        | | its velocity x, y | m/s | -25 .. 25 |
-        | | whether it is held | | 0 .. 1 |
-        | 17 | goal: x of the place where the balls come down | m | 15 .. 25 |
-
-        followed by the design (5, normalised) and the phase (3).
+        State, 17: place x (m) and velocity (m/s) of the hand; for each ball, way from the hand x, y (m), velocity x, y
+        (m/s), and whether it is held. Goal, 1: x of the place where the balls come down (m). Then the design and the
+        phase.
 
     Design space
-        `CatchBalls.design_space`; length = initial length (1 + r), r in [-0.5, 2], initially 2, 1 and 1 m;
-        angle = 60 degrees r, r in [-1, 1].
+        Length = initial length (1 + ratio), angle = scale * ratio (our reading of the paper's table). The first link
+        points down (ours); positive angles turn the chain to the right.
 
     Goal space
-        Where the balls come down: 1 to 5 m from the hand's start, left or right, uniform (ours). The balls' starts,
-        which vary as in the paper, are seen at the design step, too.
+        Where the balls come down, left or right of the hand's start, uniform (ours). The balls' starts vary as in the
+        paper: each has a height, a speed along x and its own place near the goal where it reaches the hand's height.
+        They are no part of the goal, but the state shows them at the design step.
 
     Reward
-        (held now - held before) / 3 - 0.001 per control step; +1 on success. A ball is held if its centre is above a
-        link by less than 2.5 m and below the hand, and if it is slower than 0.5 m/s as seen from the tool. An
-        episode's return lies below 2.
+        The change in the share of balls that are held, less the paper's slack, and a bonus on success. A ball is held
+        if its centre is a little above a link and below the hand, and if it is slow as seen from the tool. What is let
+        go again is taken back, so nothing is earned twice. An episode's return is below 2.
 
     Starting state
-        Hand at rest at (20, 10) (paper). Balls start 16.5 to 17, 18.25 to 18.75 and 20 to 20.5 m high, thrown at up to
-        3 m/s to the left or right, from where each reaches the hand's height within 1.2 m of the goal (ours).
+        The hand at rest where the paper's table has it; the balls above every tool, each at its own height (ours).
 
     Episode end
-        Success: each ball has been held for 15 control steps, half a second, and still is. Failure: a ball has fallen
-        below the tool, and every other one has, too, or is caught. Time limit: 150 control steps (paper) of 1/30 s.
+        Success when every ball is caught, that is, has been held for a while and still is; failure when a ball is lost
+        and no other can be caught any more; or the time limit.
     """
 
     name = "catch_balls"
@@ -209,7 +201,8 @@ class CatchBalls(Task):
     position_entries = ("landing_x",)
     state_space = STATE
     reward_terms: ClassVar = {
-        "progress": f"(k_now - k_before) / {NUM_BALLS}, k the number of balls held",
+        "progress": f"(k_now - k_before) / {NUM_BALLS}, k the number of balls held: above a link by less than "
+        f"{PILE_HEIGHT:g} m, below the hand, and slower than {SLOW:g} m/s as seen from the tool",
         "slack": f"{SLACK_REWARD:g}",
         "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
     }
@@ -239,9 +232,9 @@ class CatchBalls(Task):
         return inside
 
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
-        """Tell which goals (b, I) lie in the middle `fraction` of the places on the left or of those on the right.
+        """Return which goals (b, I) are in the middle `fraction` of the places on the left or of those on the right.
 
-        Two patches, after the paper's of fetch cube (ours).
+        These are two patches, after the paper's of fetch cube (ours).
         """
         near, far = LANDING_DISTANCE
         distance = np.abs(instances[:, LANDING] - HAND_START[0])

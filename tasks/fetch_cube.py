@@ -205,51 +205,44 @@ XY = slice(0, 2)
 class FetchCube(Task):
     """Fetch a cube from under an overhang (paper, section "Environments" and appendix "Environment Details").
 
-    The robot holds one end of a chain of three boxes and moves it, without turning it, in a box of 0.8 m x 0.2 m before
-    the overhang. The cube lies beneath the overhang and must come closer than 0.5 m
-    to the robot's base, at the origin; y points away from the robot. The tool meets the cube's sides alone, so a link
-    must stand behind the cube, and the cube's start decides which: a hook for the middle, a chain that is bent inwards
-    for the sides. One pull moves the cube by at most 0.2 m; cubes further away must be pulled twice, the second time by
-    a part of the tool closer to the hand.
+    The robot holds one end of a chain of three boxes and moves it, without turning it, in a box before the overhang.
+    The cube is beneath the overhang and must come close to the robot's base, which is at the origin; y points away from
+    the robot. The tool meets the cube's sides alone, so a link must stand behind the cube, and the cube's start decides
+    which can: a hook for cubes in the middle, a chain that is bent inwards for those at the sides. One pull moves the
+    cube no further than the held point's box is deep; cubes further away must be pulled twice, the second time by a
+    part of the tool that is closer to the hand.
 
     Action space
-        Design, 11: width, length and height of three links, 0.01 to 0.03 m, 0.1 to 0.2 m and 0.01 to 0.04 m (paper,
-        table of fetch cube, read as half extents), and the two angles between them, +-90 degrees (paper). Control, 3:
-        change of the held point's position (paper), at most 0.02 m in the plane and 0.02 m vertically in a control step
-        (ours; faster tools shoot the cube away).
+        Design, 11: width, length and height of each of three links (m) and the two angles between them (rad) (paper).
+        Control, 3: change of the held point's place x, y, z in a control step (m) (paper; range ours); its length is
+        limited in the plane, not along each axis.
 
     Observation
-        | index | what | unit | range |
-        | --- | --- | --- | --- |
-        | 0, 1 | cube position x, y | m | -1.5 .. 1.5 and -1 .. 2 |
-        | 2, 3 | cube velocity x, y | m/s | -2 .. 2 |
-        | 4, 5 | cosine and sine of four times the cube's turn about the vertical | 1 | -1 .. 1 |
-        | 6 | distance from cube to base | m | 0 .. 2.5 |
-        | 7, 8, 9 | held point x, y, z | m | -0.45 .. 0.45, 0.25 .. 0.55 and 0 .. 0.05 |
-        | 10 .. 17 | from the held point, the two joints and the tip to the cube, x and y of each | m | -2 .. 2 |
-        | 18, 19 | start of the cube x, y | m | -0.395 .. 0.395 and 0.5 .. 0.8 |
-
-        followed by the design (11, normalised) and the phase (3). Before there is a tool its joints and its tip count
-        as lying at the held point.
+        State, 18: place and velocity of the cube x, y (m, m/s), cosine and sine of four times its turn about the
+        vertical, its distance from the base (m), the held point x, y, z (m), and the ways from the held point, the two
+        joints and the tip to the cube, x and y of each (m). Goal, 2: start of the cube x, y (m). Then the design and
+        the phase. Before there is a tool its joints and its tip count as being at the held point.
 
     Design space
-        `FetchCube.design_space`, full widths, lengths and heights.
+        Link by link, then the angles. Sizes are whole widths, lengths and heights: the paper's table is read as half
+        extents, PyBullet's own measure, since tools of half the size would not reach behind the far cubes (ours). The
+        first link points away from the robot (ours); both joints turn about the vertical. The table has three angles,
+        of which the third is not used.
 
     Goal space
-        Starts of the cube, uniform in [-0.395, 0.395] x [0.5, 0.8] m (paper, in our frame: y = 1.2 m - y of the paper).
+        Starts of the cube, uniform in a rectangle (paper, in our frame).
 
     Reward
-        10 (d_before - d_after) - 0.001 per control step, d the distance from cube to base in m; +10 on success (both
-        constants but the 10 per metre from the paper's table). An episode's return lies below 15.
+        The way by which the cube came nearer to the base, less the paper's slack, and the paper's bonus on success.
+        Progress telescopes, so nothing is earned by moving the cube to and fro. An episode's return is below 15.
 
     Starting state
-        Cube at rest at its start; held point at (0, 0.5, 0.02) m (paper), raised if a link is too high for that. A tool
-        that would then be closer to the cube than 0.005 m starts at the nearest place to the left or right of there
-        that is not (ours).
+        The cube at rest at its start; the held point where the paper's table has it, at the overhang's edge (ours),
+        raised if a link is too high for that. A tool that would then be too close to the cube starts at the nearest
+        place to the left or right of there that is not (ours). So a tool may start with its hook behind the cube.
 
     Episode end
-        Success: the cube's centre is closer than 0.5 m to the base (paper). Time limit: 100 control steps (paper) of
-        1/24 s.
+        Success when the cube's centre is close enough to the base, or the time limit.
     """
 
     name = "fetch_cube"
@@ -278,10 +271,10 @@ class FetchCube(Task):
     soundness = Soundness(overlap=0.006, speed=0.8, outcome_change=0.01)
 
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
-        """Tell which starts (b, I) lie in the two patches that cover `fraction` of the training region.
+        """Return which starts (b, I) are in the two patches that cover `fraction` of the training region.
 
-        The paper's patches are the left and the right half of the region, each shrunk about its centre: those that it
-        prints cover 0.597, so we read them as the fraction 0.6 and scale the halves to any other (ours).
+        The paper's patches are the left and the right half of the region, each shrunk about its centre by the root of
+        the fraction: those that it prints cover 0.597, so we read them as 0.6 and scale the halves to any other (ours).
         """
         half = 0.5 * np.sqrt(fraction)
         width, depth = CUBE_X[1], CUBE_Y[1] - CUBE_Y[0]

@@ -207,55 +207,48 @@ class LiftCup(Task):
     """Lift a cup of given width and height from the table (paper, appendix "Environment Details").
 
     The tool is a fork: a handle, a cross bar and two prongs. The robot holds the end of the handle, moves it and never
-    turns it. The cup is square, closed at the bottom and has a rim that stands out. It is lifted by prongs that pass on
-    both sides of it, closer together than the edges of its rim: closer, they do not pass the walls; wider, they miss
-    the rim; too short, the cup tips. So the distance of the prongs must match the cup's width, with 20 mm of play on
-    each side, and none serves two cups whose widths differ by more than 40 mm, of 108 mm.
+    turns it. The cup is square, closed at the bottom and has a rim that stands out. Prongs that pass on both sides of
+    it take it under the rim. Prongs closer together than the cup is wide do not pass the walls; prongs further apart
+    than the rim's edges miss it; short prongs, and prongs that hang down, let the cup tip. So the fork must match the
+    cup: each prong has the rim's width of play, and no fork lifts two cups whose widths differ by more than twice that.
 
     Action space
-        Design, 5: distance between the prongs' inner faces, tilt, width, length and height of the prongs (paper; the
-        handle is fixed, both prongs are alike). Control, 3: change of the held end's position, +-0.02 m along x, y and
-        z, at most 0.02 m in all (ours; the paper's +-0.1 m would be 2.4 m/s).
+        Design, 5: distance between the prongs' inner faces (m), tilt (rad), width, length and height of the prongs (m)
+        (paper; the handle is fixed, both prongs are alike). Control, 3: change of the held end's place x, y, z in a
+        control step (m) (paper; range ours); its length is limited, not each entry.
 
     Observation
-        | index | what | unit | range |
-        | --- | --- | --- | --- |
-        | 0, 1, 2 | held end's position x, y, z | m | -0.15 .. 0.15, 1.1 .. 1.75, 0 .. 0.7 |
-        | 3, 4, 5 | cup's way from its start x, y, z | m | -1 .. 1 |
-        | 6, 7, 8 | from the point midway between the prongs to the cup's centre of mass x, y, z | m | -1 .. 1 |
-        | 9 | height of the rim's underside above the prongs' top, at the prongs' middle | m | -1 .. 1 |
-        | 10, 11 | free width between left and right prong and the cup's walls | m | -1 .. 1 |
-        | 12, 13, 14 | vertical parts of the cup's x, y and z axis | - | -1 .. 1 |
-        | 15 | how far the cup's y axis points along x (its turn about the vertical) | - | -1 .. 1 |
-        | 16, 17, 18 | cup's velocity x, y, z | m/s | -5 .. 5 |
-        | 19, 20 | cup's width and height, as scales | - | 0.3 .. 0.9 and 0.6 .. 0.9 |
-
-        followed by the design (5, normalised) and the phase (3). Before there is a tool, 6 to 11 are 0.
+        State, 19: place of the held end, way of the cup from its start, way from the point midway between the prongs to
+        the cup's centre of mass, x, y, z of each (m); height of the rim's underside above the prongs' top at their
+        middle, and free width between each prong and the cup's walls (m); vertical parts of the cup's three axes, and
+        how far its y axis points along x; velocity of the cup x, y, z (m/s). Goal, 2: scales of the cup's width and
+        height. Then the design and the phase. Before there is a tool, all that concerns prongs is 0.
 
     Design space
-        `LiftCup.design_space`; distance 0.04 to 0.2 m (ours, the range of the length), tilt +-30 degrees, positive with
-        the tips up, width 0.01 to 0.02 m, length 0.04 to 0.2 m, height 0.02 to 0.06 m (paper, box dimensions read as
-        half extents).
+        The paper's table gives sizes, read as half extents, PyBullet's own measure (ours), but no range for the
+        distance of the prongs; ours is that of their length. A positive tilt raises the tips; prongs turn about their
+        rear ends, in front of the cross bar. The right prong, node 3, is the left one's mirror image and has no
+        parameters.
 
     Goal space
-        The scale of the cup's width, 0.3 to 0.9, and of its height, 0.6 to 0.9 (the range of the paper's real cups),
-        uniform; times 0.18 m (ours).
+        Scales of the cup's width and height, uniform, over the range of the paper's four real cups.
 
     Reward
-        Change of the potential 10 h - 4 d + f - 0.001 per control step; +10 on success (slack and success reward:
-        paper). h is the height of the cup's lowest corner in m, between 0 and 0.4, and 0 while the cup is not upright.
-        d in m is the mean distance from four points under the rim, two on each side of the cup, to the top edge of that
-        side's prong, 5 mm of it sideways for free; f is the mean of exp(-distance / 0.03 m). The potential starts at -1
-        whatever the tool, so a tool that fits earns its fit in the first step. A return lies below 16.
+        The change of a potential, less the paper's slack, and the paper's bonus on success. The potential grows as
+        prongs come to fit the rim and as the cup is lifted. The four points under the rim are on the left and on the
+        right, in the middle of the rim, a quarter of the width before and behind the cup's centre, and move with the
+        cup. Their distance from the top edge of that side's prong has a part sideways, some of which is free, a part
+        along the prong beyond its ends, and a part in height. The potential starts at the same value whatever the tool,
+        so a tool that fits earns its fit in the first step. An episode's return is below 16.
 
     Starting state
-        Cup at rest at (0, 1.65), held end at (0, 1.2, 0.05) (paper), in m. Tools that would then be less than 2 mm
-        above the table start as much higher (ours).
+        The cup at rest and the held end where the paper's table has it. Tools that would then be too low start as much
+        higher as they need (ours). No fork reaches a rim at the start.
 
     Episode end
-        Success: the cup's lowest corner is higher than 0.4 m (paper) and its axis within 26 degrees of the vertical.
-        Failure: it is tipped by more than 46 degrees, or has fallen off the table. Time limit: 150 control steps
-        (paper) of 1/24 s.
+        Success when the cup's lowest corner is high enough and the cup upright; failure when the cup has tipped over or
+        fallen from the table; or the time limit. The lowest corner follows from the cup's rotation, since the centre of
+        a tipped cup is higher than it looks.
     """
 
     name = "lift_cup"
@@ -272,7 +265,10 @@ class LiftCup(Task):
     goal_size = 2
     state_space = STATE
     reward_terms: ClassVar = {
-        "progress": f"change of {LIFT_WEIGHT:g} h - {FIT_WEIGHT:g} d + f, h, d and f as below",
+        "progress": f"change of {LIFT_WEIGHT:g} h - {FIT_WEIGHT:g} d + f, starting from {START_POTENTIAL:g}; h the "
+        f"height of the cup's lowest corner, m, at most {SUCCESS_HEIGHT:g} and 0 while the cup is not upright; d the mean "
+        f"distance of four points under the rim from the prongs, m, {PLAY:g} m of it sideways for free; f the mean of "
+        f"exp(-distance / {FIT_LENGTH:g} m)",
         "slack": f"{SLACK_REWARD:g}",
         "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
     }

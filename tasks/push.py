@@ -123,46 +123,37 @@ PUCK_BODY, TOOL_BODY = 0, 1
 class Push(Task):
     """Push a round puck with the tool such that it stops at the goal (paper, appendix "Environment Details").
 
-    Seen from above. The tool is a chain of three links whose free end the robot holds and moves; it never turns, so
-    what the tool can do to the puck is decided by its shape. At the start the chain passes above the puck. Goals lie
-    all around: to push, a link must stand on the puck's far side from the goal, so goals below want a flat or hollow
-    underside, goals on the left a link to the right of the puck, goals on the right a hook on its left, and goals above
-    a hook beneath it. The held end stays in a box of 10 m x 4 m, too low to lift a deep hook over the puck: a tool that
-    serves one side hardly serves the other.
+    Seen from above, a robot holds the free end of a chain of three links and moves it without turning it. At the start
+    the chain passes above the puck, and goals are all around it. A link pushes only away from itself, so the goal
+    decides where a link must stand: above the puck for goals below, to its right for goals on the left, on its left, as
+    a hook, for goals on the right, and beneath it for goals above. The held end stays in a box that is too low to lift
+    a deep hook over the puck, so a tool that serves one side hardly serves the other.
 
     Action space
-        Design, 5: lengths of three links, 1 to 3 m each, and the two angles between them, +-90 degrees (paper, table
-        of push). Control, 2: velocity of the held end, +-6 m/s along x and y (range ours).
+        Design, 5: lengths of the three links (m) and the two angles between them (rad) (paper). Control, 2: velocity of
+        the held end along x and y (m/s) (ours).
 
     Observation
-        | index | what | unit | range |
-        | --- | --- | --- | --- |
-        | 0, 1 | puck position x, y | m | -6 .. 30 |
-        | 2, 3 | puck velocity x, y | m/s | -20 .. 20 |
-        | 4, 5 | held end's position x, y | m | 14 .. 24 and 6.5 .. 10.5 |
-        | 6, 7 | from puck to goal x, y | m | -25 .. 25 |
-        | 8, 9 | from held end to puck x, y | m | -25 .. 25 |
-        | 10, 11 | goal position x, y | m | 11 .. 21 and 3.25 .. 13.25 |
-
-        followed by the design (5, normalised) and the phase (3).
+        State, 10: place and velocity of the puck, place of the held end, way from the puck to the goal and from the
+        held end to the puck, x and y of each (m, m/s). Goal, 2: its place x, y (m). Then the design and the phase.
 
     Design space
-        `Push.design_space`; length = 2 m (1 + r), r in [-0.5, 0.5]; angle = 90 degrees r, r in [-1, 1].
+        Length = initial length (1 + ratio), angle = scale * ratio (our reading of the paper's table). The table has
+        three angles; a chain of three links has two joints, and the third angle is not used.
 
     Goal space
-        Positions 3 to 5 m from the puck's start, uniform in area, all directions (ours).
+        Places in a ring around the puck's start, uniform in area, in every direction (ours).
 
     Reward
-        (d_before - d_after) / d_start - 0.001 per control step, d the distance from puck to goal in m; +1 on success.
-        An episode's return lies below 2.
+        The share of the way by which the puck came nearer to the goal, less the paper's slack, and a bonus on success.
+        An episode's return is below 2.
 
     Starting state
-        Puck at rest at (16, 8.25), held end at (20, 10) (paper) for every goal. A tool that would then lie on the puck
-        starts at the nearest place to the left or right of there that is 0.25 m clear of it (ours).
+        The puck at rest and the held end where the paper's table has it, the same for every goal. A tool that would
+        then be on the puck starts at the nearest place to the left or right of there that is clear of it (ours).
 
     Episode end
-        Success: the puck's centre is within 1.5 m of the goal and slower than 0.2 m/s for 3 control steps. Time limit:
-        150 control steps of 1/30 s (150 is the paper's).
+        Success when the puck has come to rest at the goal, or the time limit.
     """
 
     name = "push"
@@ -210,9 +201,9 @@ class Push(Task):
         return inside
 
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
-        """Tell which goals (b, I) lie in the two patches, above and below the puck, that cover `fraction` of the ring.
+        """Return which goals (b, I) are in the two patches, above and below the puck, that cover `fraction` of the ring.
 
-        A patch is a sector of the ring, centred in angle and in area, scaled alike in both (ours, after the paper's
+        A patch is a sector of the ring, centred in angle and in area and scaled alike in both (ours, after the paper's
         two patches of fetch cube).
         """
         near, far = GOAL_DISTANCE

@@ -201,54 +201,42 @@ BALL_BODIES, TOOL_BODY = slice(0, NUM_BALLS), NUM_BALLS
 class Scoop(Task):
     """Scoop a wanted number of balls out of a reservoir (paper, appendix "Environment Details").
 
-    Seen from the side. The tool is a chain of three links: a handle and two more that curl up into a ladle. It starts
-    inside the pile. The hand moves it gently and tilts it a little, with limited force. It can hardly shake or pour
-    balls off, and sees them only once they are out, so the number of balls that stay on the tool is decided by its
-    shape: a deep or long ladle for many, a short one for few.
+    Seen from the side, a robot holds a ladle, a chain of three links: a handle and two more that curl up behind it. The
+    ladle starts inside the pile. The hand moves it gently and tilts it a little, with limited force. It can hardly
+    shake or pour balls off, and the observation shows how many there are only once they are out. So the number of balls
+    that stay on the tool is decided by its shape: a deep or long ladle for many, a short one for few.
 
     Action space
-        Design, 5: lengths of three links, 1.8 to 7.2 m, 0.9 to 3.6 m and 0.9 to 3.6 m, and the two angles between them,
-        -9 to 63 degrees (paper, table of scoop). Control, 3: velocity of the first joint, +-1.5 m/s along x and y,
-        and angular velocity, +-0.3 rad/s (ranges ours). The velocity changes by at most 3 m/s^2, the tool tilts by at
-        most 0.1 rad and keeps 1.4 m from floor and walls (ours).
+        Design, 5: lengths of the three links (m) and the two angles between them (rad) (paper). Control, 3: velocity of
+        the first joint along x and y (m/s) and angular velocity (rad/s) (ours). Acceleration and tilt are limited, and
+        the tool keeps away from floor and walls (ours).
 
     Observation
-        | index | what | unit | range |
-        | --- | --- | --- | --- |
-        | 0, 1 | first joint's position x, y | m | 0 .. 40 |
-        | 2 | tilt | rad | -1 .. 1 |
-        | 3 | y of the tool's lowest point | m | 0 .. 40 |
-        | 4, 5 | first joint's velocity x, y | m/s | -20 .. 20 |
-        | 6 | angular velocity | rad/s | -10 .. 10 |
-        | 7 | balls held out of the reservoir | balls | 0 .. 40 |
-        | 8 | the same less the wanted number | balls | -40 .. 40 |
-        | 9 | control steps in a row with the wanted number at rest | steps | 0 .. 3 |
-        | 10 - 13 | from first joint to second joint and to tip x, y | m | -10 .. 10 |
-        | 14 - 20 | whether 1, 2, ..., 7 balls are wanted | | 0 .. 1 |
-        | 21 | wanted number | balls | 1 .. 7 |
-
-        followed by the design (5, normalised) and the phase (3).
+        State, 21: place of the first joint (m), tilt (rad), height of the tool's lowest point (m), velocity (m/s) and
+        angular velocity (rad/s); balls held out of the reservoir, the same less the wanted number, control steps for
+        which success has held; the ways from the first joint to the second and to the tip (m); and which number is
+        wanted, one entry for each. Goal, 1: the wanted number. Then the design and the phase.
 
     Design space
-        `Scoop.design_space`; length = 6, 3, 3 m (1 + r), r in [-0.7, 0.2]; angle = 90 degrees r, r in [-0.1, 0.7].
+        Length = initial length (1 + ratio), angle = scale * ratio (our reading of the paper's table). The table has
+        three angles; a chain of three links has two joints, and the third angle is not used.
 
     Goal space
-        1 to 7 balls of 40 (paper), all alike often (ours).
+        Whole numbers of balls (paper), each equally often (ours). An instance also holds which pile there is and how
+        far to the left or right the tool starts; policies do not see these two.
 
     Reward
-        Change of h (min(1 + k, 1 + n) / max(1 + k, 1 + n))^1.5 - 0.001 per control step, n the wanted number, k the
-        number of balls vertically above the tool, h the share of the way up, from y = 10 m to 14.78 m, that the tool's
-        lowest point has made; +1 on success. An episode's return lies below 2.
+        The change of a potential that grows as the tool is lifted and is the larger, the nearer the number of balls
+        above it is to the wanted one; less the paper's slack, and a bonus on success. Lowering the tool loses what
+        lifting it earns. An episode's return is below 2.
 
     Starting state
-        One of 32 piles, nearly at rest; the tool upright in it, its first joint at x = 15 m (paper) +-0.4 m and its
-        lowest point at y = 10 m (paper; our reading), 1.4 m above the floor. Balls that would overlap it lie on top of
-        the pile and fall into place in the first second (ours).
+        A pile nearly at rest and the tool upright in it, at the place of the paper's table (our reading of it). Balls
+        that would overlap the tool are put on top of the pile and fall into place within the first second (ours).
 
     Episode end
-        Success: for 3 control steps the tool is clear of the reservoir, that is, its lowest point is above y = 14.28 m,
-        and as many balls as wanted are vertically above it, all slower than 0.3 m/s relative to it. Time limit: 30
-        control steps of 1/6 s, five physics steps each (30 and five are the paper's).
+        Success when the tool is clear of the reservoir and as many balls as wanted have been at rest on it for a few
+        control steps, or the time limit.
     """
 
     name = "scoop"

@@ -230,61 +230,50 @@ BALL_PICTURE = _ball_picture()
 
 
 class Scoop3D(Task):
-    """Scoop as many balls out of a reservoir of 40 as are wanted (paper, appendix "Environment Details").
+    """Scoop as many balls out of a reservoir as are wanted (paper, appendix "Environment Details").
 
     The tool is a scoop of six links: a rectangular bottom plate, a plate on each of its four sides, and a handle on the
-    back one. It starts on the floor of the reservoir, among the balls and filled to overflowing with those that lay
-    there; what does not fit rolls off on the way up. The tool can be turned only a little, so that the room between
-    its plates decides how many balls come along, and every number wants a tool of its own.
+    back one. It starts on the floor of the reservoir, among the balls and filled to overflowing; what does not fit
+    rolls off on the way up. The tool can be turned only a little, so the room between its plates decides how many balls
+    come along, and every number wants a tool of its own.
 
     Action space
-        Design, 10: width and length of the bottom plate, 0.08 to 0.16 m, heights of the back, front, left and right
-        plates, 0.04 to 0.1 m, and how far each leans outwards, +-15 degrees (paper, table of 3D scoop, read as half
-        extents). Plates are 0.01 m thick (paper). Control, 6: change of the tool's pose in a control step, 0.015 times
-        +-1 along x, y and z and 0.015 times +-1.57 about x, y and z (bounds the paper's, scale ours, m and rad our
-        reading); turns stay within 0.25, 0.25 and 0.3 rad (ours).
+        Design, 10: width and length of the bottom plate (m), heights of the back, front, left and right plates (m), and
+        how far each of these leans outwards (rad) (paper). Control, 6: change of the tool's place x, y, z (m) and of
+        its turns about x, y, z (rad) in a control step (paper; scale ours). Place and turns are limited (ours).
 
     Observation
-        | index | what | unit | range |
-        | --- | --- | --- | --- |
-        | 0 to 2 | middle of the bottom plate x, y, z | m | -0.1 .. 0.1, -0.1 .. 0.2 and -0.1 .. 0.3 |
-        | 3 to 5 | turns about x, y, z | rad | -0.5 .. 0.5 |
-        | 6 | from the bottom plate's lowest point up to the line | m | -0.3 .. 0.3 |
-        | 7 | balls in or above the tool | balls | 0 .. 40 |
-        | 8 | balls held above the line | balls | 0 .. 40 |
-        | 9 | balls wanted less those in or above the tool | balls | -40 .. 40 |
-        | 10 | control steps for which the wanted number has been held, of 6 | 1 | 0 .. 1 |
-        | 11 | control steps for which the tool has been clear, of 30 | 1 | 0 .. 1 |
-        | 12, 13 | mean place of the balls in or above the tool, in its frame, x, y | m | -0.2 .. 0.2 |
-        | 14 | highest of them above the bottom plate | m | 0 .. 0.5 |
-        | 15 to 21 | whether 1, 2, ... 7 balls are wanted | 1 | 0 .. 1 |
-        | 22 | balls wanted | balls | 1 .. 7 |
-
-        followed by the design (10, normalised) and the phase (3).
+        State, 22: place x, y, z (m) and turns about x, y, z (rad) of the bottom plate, way from its lowest point up to
+        the line (m); balls in or above the tool, balls held above the line, balls that are missing; the shares of the
+        control steps after which success and failure come; mean place of the balls in or above the tool, in its frame,
+        x, y (m), and the highest of them (m); and which number is wanted, one entry for each. Goal, 1: the wanted
+        number. Then the design and the phase.
 
     Design space
-        `Scoop3D.design_space`.
+        Sizes are whole widths, lengths and heights: the paper's table is read as half extents, PyBullet's own measure
+        (ours); its fixed entry is half the thickness of all plates. The bottom plate joins the four side plates, the
+        back plate joins the handle, which the robot holds: it is fixed and leans back (ours), so that it never passes
+        over the opening.
 
     Goal space
-        Whole numbers of balls from 1 to 7 (paper), all alike. The pile differs between episodes, too: how the balls
-        lie and how they are poured on the tool; policies are not told.
+        Whole numbers of balls (paper), each equally often. An instance also holds the number of a pile: how the balls
+        lie and how they are poured on the tool. Policies do not see it.
 
     Reward
-        The change of 5 h c in every control step, - 0.001 per control step, + 10 on success (paper, table of 3D scoop).
-        h: share of the way from the start to the line that the bottom plate's lowest point has been lifted, 0 to 1.
-        c = (min(k + 1, n + 1) / max(k + 1, n + 1))^1.5 with k balls in or above the tool and n wanted. The potential
-        starts at 0 whatever the tool; an episode's return lies below 15.
+        The change of a potential that grows as the tool is lifted and is the larger, the nearer the number of balls in
+        or above it is to the wanted one; less the paper's slack, and the paper's bonus on success. The potential starts
+        at 0 whatever is in the tool. An episode's return is below 15.
 
     Starting state
-        The middle of the bottom plate is at (0, 0.05) (paper), 0.004 m above the floor (ours; the paper's height
-        of 0.1 m is above the balls). Balls that would touch the tool are poured on it from above, then all come to rest
-        for 16 control steps before the episode starts (ours).
+        The middle of the bottom plate is where the paper's table has it, but close to the floor: at the paper's height
+        it would be above the balls. The balls are on the floor side by side, each anywhere in its own cell. Those that
+        would touch the tool are poured on it from above, then all come to rest before the first control (ours).
 
     Episode end
-        Success: the tool is clear, its bottom plate nowhere lower than 0.13 m, and exactly the wanted number of balls
-        is held for 6 control steps in a row. Held: between the side plates, above the bottom plate, and slower than
-        0.5 m/s in the tool's frame. Failure: the tool has been clear for 30 control steps without success. Time limit:
-        100 control steps (paper) of 1/30 s.
+        Success when the tool is clear of the reservoir and exactly the wanted number of balls has been held for a few
+        control steps; failure when it has been clear for longer without success; or the time limit. A ball is held if
+        it is between the side plates, above the bottom plate, and slow in the tool's frame; while another one is still
+        flying over the tool, nothing counts.
     """
 
     name = "scoop_3d"
@@ -309,7 +298,8 @@ class Scoop3D(Task):
     }
     success_conditions: ClassVar = {
         "clear": f"the bottom plate is nowhere lower than {LINE:g} m",
-        "wanted_number": "exactly the wanted number of balls is held",
+        "wanted_number": f"exactly the wanted number of balls is held, that is, in or above the tool and slower than "
+        f"{HELD_SPEED:g} m/s in its frame",
         "none_flying": "no other ball is above the tool",
     }
     success_steps = HELD_STEPS

@@ -5,8 +5,6 @@ Nothing here depends on a tuned number: all of them are read from the task's mod
 
 from __future__ import annotations
 
-import inspect
-import re
 from dataclasses import dataclass, field
 from importlib import import_module
 from itertools import product
@@ -30,8 +28,6 @@ RIGHT, LEFT = PAN, PAN * script.CatchBallsScript.MIRROR
 """The script's pans, normalised."""
 HANGING = np.array([[1.0, 1.0, 1.0, 0.0, 0.0]])
 """The longest tool, straight down."""
-SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
-"""A title in the docstring and the indented text below it."""
 
 
 @dataclass
@@ -70,42 +66,6 @@ def play(instance: Floats, design: Floats, control: Floats = IDLE) -> Outcome:
         if terminated[0] or truncated[0]:
             outcome.terminated, outcome.success = bool(terminated[0]), bool(episodes.success(SLOT)[0])
             return outcome
-
-
-def test_the_docstring_tells_the_constants() -> None:
-    task = load_task("catch_balls")
-    text = inspect.cleandoc(str(task.__doc__))
-    sections = {title: " ".join(body.split()) for title, body in SECTION.findall(text)}
-    (near, far), x = catch.LANDING_DISTANCE, catch.HAND_START[0]
-    state = task.state_space
-    for title, numbers in {
-        "Action space": (f"+-{catch.MAX_SPEED:g} m/s", f"{catch.MAX_ACCELERATION:g} m/s^2"),
-        "Observation": (
-            f"| {state.low[0]:g} .. {state.high[0]:g} |",
-            f"| {state.low[1]:g} .. {state.high[1]:g} |",
-            f"| {state.low[2]:g} .. {state.high[2]:g} |",
-            f"| {state.low[4]:g} .. {state.high[4]:g} |",
-            f"| {x - far:g} .. {x + far:g} |",
-        ),
-        "Goal space": (f"{near:g} to {far:g} m",),
-        "Reward": (
-            f"/ {catch.NUM_BALLS} - {-catch.SLACK_REWARD:g} per control step",
-            f"+{catch.SUCCESS_REWARD:g} on success",
-            f"{catch.PILE_HEIGHT:g} m",
-            f"{catch.SLOW:g} m/s",
-        ),
-        "Starting state": (
-            "({:g}, {:g})".format(*catch.HAND_START),
-            *(f"{low:g} to {high:g}" for low, high in catch.START_HEIGHTS),
-            f"{catch.THROW_SPEED:g} m/s",
-            f"{catch.LANDING_SPREAD:g} m",
-        ),
-        "Episode end": (
-            f"{catch.HOLD_STEPS} control steps",
-            f"{task.horizon} control steps (paper) of 1/{1.0 / task.control_period:g} s",
-        ),
-    }.items():
-        assert [number for number in numbers if number not in sections[title]] == [], title
 
 
 def test_a_throw_by_hand() -> None:

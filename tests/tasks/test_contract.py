@@ -154,6 +154,29 @@ def test_an_episode_ends_once_within_the_horizon(task: Task) -> None:
     assert not recording.truncated[: task.horizon - 1].any()
 
 
+def test_the_docstring_has_the_sections_that_a_reader_looks_for_and_states_the_sizes(task: Task) -> None:
+    text = " ".join(str(type(task).__doc__).split())
+    for section in ("Action space", "Observation", "Goal space", "Reward", "Starting state", "Episode end"):
+        assert f" {section} " in text
+    for part, space in {
+        "Design": task.design_space,
+        "Control": task.control_space,
+        "State": task.state_space,
+        "Goal": task.goal_space,
+    }.items():
+        assert f"{part}, {space.size}: " in text
+
+
+def test_everything_in_a_scene_has_a_unit_and_a_source(task: Task) -> None:
+    assert task.scene
+    assert [name for name, constant in task.scene.items() if not (constant.unit and constant.source)] == []
+
+
+def test_names_of_an_observation_are_different(task: Task) -> None:
+    told = [*task.state_space.names, *task.goal_space.names, *task.design_space.names, *task.layout.PHASE_NAMES]
+    assert len(set(told)) == len(told)
+
+
 def test_spaces_agree_in_size(task: Task) -> None:
     designs = task.design_space.from_unit(script_for(task).designs)
     assert len(task.tool_graph.parameter_nodes) == task.design_space.size

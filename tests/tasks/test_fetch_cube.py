@@ -6,8 +6,6 @@ Nothing here depends on a tuned number: all of them are read from the task's mod
 from __future__ import annotations
 
 import gc
-import inspect
-import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -28,8 +26,6 @@ fetch: Any = load_module("tasks", "fetch_cube")
 SLOT = np.array([0])
 HALF = 0.5 * fetch.CUBE_SIZE
 PULL, SIDEWAYS, IDLE = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0]), np.zeros(3)
-SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
-"""A title in the docstring and the indented text below it."""
 
 
 def design(lengths: Sequence[float], angles: Sequence[float], width: float = 0.02, height: float = 0.03) -> Floats:
@@ -90,31 +86,6 @@ def many_designs(count: int) -> Floats:
     corners[:, [0, 1, 4, 7, 9, 10]] = list(product((-1.0, 1.0), repeat=6))
     corners[:, [3, 6]] = corners[:, [0]]
     return np.vstack([corners, np.random.default_rng(7).uniform(-1.0, 1.0, size=(count, size))])
-
-
-def test_the_docstring_tells_the_constants() -> None:
-    task = load_task("fetch_cube")
-    text = inspect.cleandoc(str(task.__doc__))
-    sections = {title: " ".join(body.split()) for title, body in SECTION.findall(text)}
-    (x_low, x_high), (y_low, y_high), state = fetch.CUBE_X, fetch.CUBE_Y, task.state_space
-    sizes = [f"{low:g} to {high:g} m" for low, high in fetch.SIZES]
-    for title, numbers in {
-        "Action space": (*sizes, f"+-{np.rad2deg(fetch.ANGLES[1]):g} degrees", f"{fetch.STEP_LENGTH:g} m in the plane"),
-        "Observation": tuple(f"{low:g} .. {high:g}" for low, high in zip(state.low, state.high, strict=True)),
-        "Goal space": (f"[{x_low:g}, {x_high:g}] x [{y_low:g}, {y_high:g}] m", f"{fetch.PAPER_ORIGIN:g} m - y"),
-        "Reward": (
-            f"{fetch.PROGRESS_WEIGHT:g} (d_before - d_after)",
-            f"{-fetch.SLACK_REWARD:g} per control step",
-            f"+{fetch.SUCCESS_REWARD:g} on success",
-        ),
-        "Starting state": ("({:g}, {:g}, {:g}) m".format(*fetch.HOLD_START), f"{fetch.START_CLEARANCE:g} m"),
-        "Episode end": (
-            f"closer than {fetch.GOAL_DISTANCE:g} m",
-            f"{task.horizon} control steps",
-            f"1/{1.0 / task.control_period:g} s",
-        ),
-    }.items():
-        assert [number for number in numbers if number not in sections[title]] == [], title
 
 
 def test_the_chain_by_hand() -> None:

@@ -6,7 +6,6 @@ Nothing here depends on a tuned number: all of them are read from the task's mod
 from __future__ import annotations
 
 import inspect
-import re
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
@@ -24,8 +23,6 @@ bullet: Any = inspect.getmodule(lift.BulletSimulator)
 SLOT = np.array([0])
 SMALL, MIDDLE, WIDE = ((0.3, 0.6), (0.5, 0.8), (0.9, 0.9))
 """Cups (scales of width and height); the paper made tools for (0.3, 0.6) and (0.5, 0.8), too."""
-SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
-"""A title in the docstring and the indented text below it."""
 
 
 @dataclass
@@ -101,50 +98,6 @@ def corners_of_boxes(boxes: Any) -> Floats:
 def all_corners() -> Floats:
     """Return the (32, 5) corners of the design space, normalised."""
     return np.array(list(product((-1.0, 1.0), repeat=5)))
-
-
-def test_the_docstring_tells_the_constants() -> None:
-    task = load_task("lift_cup")
-    text = inspect.cleandoc(str(task.__doc__))
-    sections = {title: " ".join(body.split()) for title, body in SECTION.findall(text)}
-    design, goals, state, room = task.design_space, task.goal_space, task.state_space, lift.WORKSPACE
-    degrees = {name: f"{np.rad2deg(np.arccos(getattr(lift, name))):.0f} degrees" for name in ("UPRIGHT", "TIPPED")}
-    for title, numbers in {
-        "Action space": (f"+-{lift.MAX_MOVE:g} m", f"{lift.MAX_MOVE / lift.CLOCK.control_period * 5:.1f} m/s"),
-        "Observation": (
-            ", ".join(f"{low:g} .. {high:g}" for low, high in zip(room.low, room.high, strict=True)),
-            f"| {state.low[16]:g} .. {state.high[16]:g} |",
-            f"| {goals.low[0]:g} .. {goals.high[0]:g} and {goals.low[1]:g} .. {goals.high[1]:g} |",
-        ),
-        "Design space": (
-            f"distance {design.low[0]:g} to {design.high[0]:g} m",
-            f"tilt +-{np.rad2deg(design.high[1]):.0f} degrees",
-            f"width {design.low[2]:g} to {design.high[2]:g} m",
-            f"length {design.low[3]:g} to {design.high[3]:g} m",
-            f"height {design.low[4]:g} to {design.high[4]:g} m",
-        ),
-        "Goal space": (f"{goals.low[0]:g} to {goals.high[0]:g}", f"{goals.low[1]:g} to {goals.high[1]:g}", "0.18 m"),
-        "Reward": (
-            f"{lift.LIFT_WEIGHT:g} h - {lift.FIT_WEIGHT:g} d + f - {-lift.SLACK_REWARD:g} per control step",
-            f"+{lift.SUCCESS_REWARD:g} on success",
-            f"exp(-distance / {lift.FIT_LENGTH:g} m)",
-            f"{1000.0 * lift.PLAY:g} mm",
-            f"starts at {lift.START_POTENTIAL:g}",
-        ),
-        "Starting state": (
-            f"(0, {lift.CUP_START_Y:g})",
-            "({:g}, {:g}, {:g})".format(*lift.TOOL_START),
-            f"{1000.0 * lift.TOOL_CLEARANCE:g} mm",
-        ),
-        "Episode end": (
-            f"{lift.SUCCESS_HEIGHT:g} m",
-            f"within {degrees['UPRIGHT']}",
-            f"more than {degrees['TIPPED']}",
-            f"{task.horizon} control steps",
-            f"1/{1.0 / task.control_period:g} s",
-        ),
-    }.items():
-        assert [number for number in numbers if number not in sections[title]] == [], title
 
 
 def test_a_level_fork_by_hand() -> None:

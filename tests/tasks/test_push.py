@@ -5,8 +5,6 @@ Nothing here depends on a tuned number: all of them are read from the task's mod
 
 from __future__ import annotations
 
-import inspect
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise, product
@@ -27,8 +25,6 @@ SLOT = np.array([0])
 STRAIGHT = np.array([[-0.25, -0.25, -0.25, 0.0, 0.0]])
 """A straight tool, normalised: short enough to go behind the puck, long enough to push it to far goals on the left."""
 IDLE = np.zeros((1, 2))
-SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
-"""A title in the docstring and the indented text below it."""
 
 
 @dataclass
@@ -123,36 +119,6 @@ def many_designs(count: int) -> Floats:
     space = load_task("push").design_space
     inside = np.random.default_rng(7).uniform(-1.0, 1.0, size=(count, space.size))
     return space.from_unit(np.vstack([list(product((-1.0, 1.0), repeat=space.size)), inside]))
-
-
-def test_the_docstring_tells_the_constants() -> None:
-    task = load_task("push")
-    text = inspect.cleandoc(str(task.__doc__))
-    sections = {title: " ".join(body.split()) for title, body in SECTION.findall(text)}
-    (near, far), goals, state = push.GOAL_DISTANCE, task.goal_space, task.state_space
-    for title, numbers in {
-        "Action space": (f"+-{push.MAX_SPEED:g} m/s",),
-        "Observation": (
-            f"| {state.low[0]:g} .. {state.high[0]:g} |",
-            f"| {state.low[2]:g} .. {state.high[2]:g} |",
-            f"| {state.low[6]:g} .. {state.high[6]:g} |",
-            f"| {goals.low[0]:g} .. {goals.high[0]:g} and {goals.low[1]:g} .. {goals.high[1]:g} |",
-        ),
-        "Goal space": (f"{near:g} to {far:g} m",),
-        "Reward": (f"{-push.SLACK_REWARD:g} per control step", f"+{push.SUCCESS_REWARD:g} on success"),
-        "Starting state": (
-            "({:g}, {:g})".format(*push.PUCK_START),
-            "({:g}, {:g})".format(*push.TOOL_START),
-            f"{push.START_CLEARANCE:g} m",
-        ),
-        "Episode end": (
-            f"within {push.GOAL_RADIUS:g} m",
-            f"{push.REST_SPEED:g} m/s",
-            f"{push.REST_STEPS} control steps",
-            f"{task.horizon} control steps of 1/{1.0 / task.control_period:g} s",
-        ),
-    }.items():
-        assert [number for number in numbers if number not in sections[title]] == [], title
 
 
 def test_chain_points_by_hand() -> None:

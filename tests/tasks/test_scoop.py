@@ -5,8 +5,6 @@ Nothing here depends on a tuned number: all of them are read from the task's mod
 
 from __future__ import annotations
 
-import inspect
-import re
 from itertools import product
 from typing import Any
 
@@ -24,8 +22,6 @@ SLOT = np.array([0])
 IDLE = np.zeros((1, 3))
 TRAY = np.array([[0.0, 1.0, 1.0, 1.0, -0.75]])
 """A ladle, normalised, whose second and third link make one long tray that rises by 3 degrees: less than balls need."""
-SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
-"""A title in the docstring and the indented text below it."""
 
 
 def instance(wanted: int, pile: int = 0, shift: float = 0.0) -> Floats:
@@ -73,49 +69,6 @@ def idle(episodes: Episodes, steps: int) -> list[bool]:
         episodes.simulator.step(SLOT, IDLE)
         results.append(bool(episodes.success(SLOT)[0]))
     return results
-
-
-def test_the_docstring_tells_the_constants() -> None:
-    task = load_task("scoop")
-    text = inspect.cleandoc(str(task.__doc__))
-    sections = {title: " ".join(body.split()) for title, body in SECTION.findall(text)}
-    few, many = scoop.GOAL_NUMBERS
-    lengths = [f"{low:g} to {high:g} m" for low, high in zip(*task.design_space.bounds, strict=True)][:3]
-    low, high = np.rad2deg(task.design_space.bounds)[:, 3]
-    for title, numbers in {
-        "Action space": (
-            *lengths,
-            f"{low:g} to {high:g} degrees",
-            f"+-{scoop.MAX_SPEED:g} m/s",
-            f"+-{scoop.MAX_TURN:g} rad/s",
-            f"{scoop.MAX_ACCELERATION:g} m/s^2",
-            f"{scoop.MAX_TILT:g} rad",
-            f"{scoop.CLEARANCE:g} m from floor and walls",
-        ),
-        "Observation": tuple(
-            f"{task.state_space.low[index]:g} .. {task.state_space.high[index]:g} |" for index in range(14)
-        ),
-        "Goal space": (f"{few} to {many} balls of {scoop.NUM_BALLS}",),
-        "Reward": (
-            f"^{scoop.NUMBER_EXPONENT:g}",
-            f"{-scoop.SLACK_REWARD:g} per control step",
-            f"from y = {scoop.TOOL_START[1]:g} m to {scoop.CEILING:g} m",
-            f"+{scoop.SUCCESS_REWARD:g} on success",
-        ),
-        "Starting state": (
-            f"{scoop.NUM_PILES} piles",
-            f"x = {scoop.TOOL_START[0]:g} m (paper) +-{scoop.START_SHIFT:g} m",
-            f"y = {scoop.TOOL_START[1]:g} m",
-            f"{scoop.TOOL_START[1] - scoop.FLOOR:g} m above the floor",
-        ),
-        "Episode end": (
-            f"{scoop.HELD_STEPS} control steps",
-            f"y = {scoop.CLEAR:g} m",
-            f"{scoop.REST_SPEED:g} m/s",
-            f"{task.horizon} control steps of 1/{1.0 / task.control_period:g} s",
-        ),
-    }.items():
-        assert [number for number in numbers if number not in sections[title]] == [], title
 
 
 def test_balls_above_a_ladle_by_hand() -> None:

@@ -5,8 +5,6 @@ Nothing here depends on a tuned number: all of them are read from the task's mod
 
 from __future__ import annotations
 
-import inspect
-import re
 from importlib import import_module
 from itertools import product
 from typing import Any
@@ -25,8 +23,6 @@ scoop: Any = load_module("tasks", "scoop_3d")
 script: Any = import_module("codesign_bench.tasks._scripts.scoop_3d")
 SLOT = np.array([0])
 LIFT = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
-SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
-"""A title in the docstring and the indented text below it."""
 
 
 def tool_for(count: int) -> Floats:
@@ -55,49 +51,6 @@ def lift_to_the_end(episodes: Episodes) -> tuple[list[float], bool]:
 def box_tool(width: float, length: float, height: float, angle: float = 0.0) -> Floats:
     """Return a design (1, D) whose four sides are alike, in the design space's units."""
     return np.array([[width, length, *[height] * 4, *[angle] * 4]])
-
-
-def test_the_docstring_tells_the_constants() -> None:
-    task = load_task("scoop_3d")
-    text = inspect.cleandoc(str(task.__doc__))
-    sections = {title: " ".join(body.split()) for title, body in SECTION.findall(text)}
-    space, state = task.design_space, task.state_space
-    for title, numbers in {
-        "Action space": (
-            f"{space.low[0]:g} to {space.high[0]:g} m",
-            f"{space.low[2]:g} to {space.high[2]:g} m",
-            f"+-{np.rad2deg(space.high[6]):g} degrees",
-            f"{2.0 * scoop.HALF_THICKNESS:g} m thick",
-            f"{scoop.CONTROL_SCALE:g} times +-{scoop.CONTROL_MAX[5]:g}",
-            "{:g}, {:g} and {:g} rad".format(*scoop.LARGEST_TURN),
-        ),
-        "Observation": (
-            f"{state.low[2]:g} .. {state.high[2]:g} |",
-            f"of {scoop.HELD_STEPS} |",
-            f"of {scoop.LOST_STEPS} |",
-            f"| {scoop.WANTED[0]} .. {scoop.WANTED[1]} |",
-        ),
-        "Goal space": (f"from {scoop.WANTED[0]} to {scoop.WANTED[1]}",),
-        "Reward": (
-            f"change of {scoop.PROGRESS_REWARD:g} h c",
-            f"{-scoop.SLACK_REWARD:g} per control step",
-            f"+ {scoop.SUCCESS_REWARD:g} on success",
-            f"^{scoop.CLOSENESS_POWER:g}",
-        ),
-        "Starting state": (
-            "({:g}, {:g})".format(*scoop.TOOL_START),
-            f"{scoop.FLOOR_CLEARANCE:g} m above the floor",
-            f"for {scoop.SETTLING_STEPS} control steps",
-        ),
-        "Episode end": (
-            f"lower than {scoop.LINE:g} m",
-            f"for {scoop.HELD_STEPS} control steps",
-            f"{scoop.HELD_SPEED:g} m/s",
-            f"for {scoop.LOST_STEPS} control steps",
-            f"{task.horizon} control steps (paper) of 1/{1.0 / task.control_period:g} s",
-        ),
-    }.items():
-        assert [number for number in numbers if number not in sections[title]] == [], title
 
 
 def test_an_upright_box_by_hand() -> None:

@@ -266,9 +266,9 @@ class LiftCup(Task):
     state_space = STATE
     reward_terms: ClassVar = {
         "progress": f"change of {LIFT_WEIGHT:g} h - {FIT_WEIGHT:g} d + f, starting from {START_POTENTIAL:g}; h the "
-        f"height of the cup's lowest corner, m, at most {SUCCESS_HEIGHT:g} and 0 while the cup is not upright; d the mean "
-        f"distance of four points under the rim from the prongs, m, {PLAY:g} m of it sideways for free; f the mean of "
-        f"exp(-distance / {FIT_LENGTH:g} m)",
+        f"height of the cup's lowest corner, m, at most {SUCCESS_HEIGHT:g} and 0 while the cup is not upright; d the "
+        f"mean distance of four points under the rim from the prongs, m, {PLAY:g} m of it sideways for free; f the "
+        f"mean of exp(-distance / {FIT_LENGTH:g} m)",
         "slack": f"{SLACK_REWARD:g}",
         "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
     }

@@ -201,7 +201,7 @@ class Push(Task):
         return inside
 
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
-        """Return which goals (b, I) are in the two patches, above and below the puck, that cover `fraction` of the ring.
+        """Return which goals (b, I) are in the two patches, above and below the puck, that cover `fraction` of them.
 
         A patch is a sector of the ring, centred in angle and in area and scaled alike in both (ours, after the paper's
         two patches of fetch cube).

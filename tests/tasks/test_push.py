@@ -121,16 +121,6 @@ def many_designs(count: int) -> Floats:
     return space.from_unit(np.vstack([list(product((-1.0, 1.0), repeat=space.size)), inside]))
 
 
-def test_chain_points_by_hand() -> None:
-    quarter = np.pi / 2.0
-    straight = push.chain_points(np.array([[1.0, 2.0, 3.0, 0.0, 0.0]]), 0.0)
-    np.testing.assert_allclose(straight, [[[0, 0], [1, 0], [3, 0], [6, 0]]], atol=1e-12)
-    stairs = push.chain_points(np.array([[1.0, 2.0, 3.0, quarter, -quarter]]), 0.0)
-    np.testing.assert_allclose(stairs, [[[0, 0], [1, 0], [1, 2], [4, 2]]], atol=1e-12)
-    hook = push.chain_points(np.array([[1.0, 2.0, 3.0, quarter, quarter]]), np.pi)
-    np.testing.assert_allclose(hook, [[[0, 0], [-1, 0], [-1, -2], [2, -2]]], atol=1e-12)
-
-
 def test_no_tool_starts_on_the_puck() -> None:
     chains = push.chain_points(many_designs(2_000), push.FIRST_LINK_ANGLE)
     shifts = push.start_shift(chains)
@@ -238,18 +228,6 @@ def test_rewards_add_up_to_the_share_of_the_way_made(prepare: Callable[[pymunk.S
     steps = len(outcome.reward)
     expected = (first - last) / first + push.SLACK_REWARD * steps + push.SUCCESS_REWARD * outcome.success
     assert sum(outcome.reward) == pytest.approx(expected, abs=1e-9)
-
-
-def test_half_the_physics_step_leaves_the_outcome_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    goals = [goal_at(distance, np.pi) for distance in push.GOAL_DISTANCE]
-    coarse = [play(goal, push_left, as_built) for goal in goals]
-    monkeypatch.setattr(push, "CLOCK", push.CLOCK.refined(2))
-    fine = [play(goal, push_left, as_built) for goal in goals]
-    for before, after in zip(coarse, fine, strict=True):
-        assert before.success
-        assert after.success
-        assert abs(len(before.reward) - len(after.reward)) <= 3  # Control steps.
-        np.testing.assert_allclose(before.puck[-1], after.puck[-1], atol=0.1)  # A tenth of the puck's radius.
 
 
 def test_nothing_explodes_or_tunnels_at_the_corners_of_the_design_space() -> None:

@@ -114,6 +114,8 @@ PHYSICS_PERIOD: Annotated[float, Given("s", OURS)] = 1.0 / 120.0
 CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
 
 
+CONTROL = Box.of(velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"))
+HAND_SPEED = CONTROL.index("velocity_x")
 INSTANCE = Box.of(
     landing_x=(float(HAND_START[0]) - LANDING_DISTANCE[1], float(HAND_START[0]) + LANDING_DISTANCE[1], "m"),
     **{f"ball_{k + 1}_offset": (-LANDING_SPREAD, LANDING_SPREAD, "m") for k in range(NUM_BALLS)},
@@ -195,7 +197,7 @@ class CatchBalls(Task):
     control_period = CLOCK.control_period
     design_space = chain_design_space(LENGTH_INIT, LENGTH_RATIO, ANGLE_SCALE, ANGLE_RATIO)
     tool_graph = CHAIN_GRAPH
-    control_space = Box.of(velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"))
+    control_space = CONTROL
     instance_space = INSTANCE
     goal_size = 1
     position_entries = ("landing_x",)
@@ -247,7 +249,7 @@ class CatchBalls(Task):
 
     def effort(self, controls: Floats) -> Floats:
         """Return the share of the largest speed of the hand for controls (b, C) in [-1, 1]."""
-        speed: Floats = np.abs(controls[:, 0])
+        speed: Floats = np.abs(controls[:, HAND_SPEED])
         return speed
 
     def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
@@ -323,7 +325,7 @@ class _CatchSimulator(PlanarSimulator):
         """Move the hands by `controls` (b, C) for one control step and reward the balls that came to be held."""
         change = MAX_ACCELERATION * self.clock.control_period
         before = self.velocity[slots]
-        velocity = np.clip(controls[:, 0] * MAX_SPEED, before - change, before + change)
+        velocity = np.clip(controls[:, HAND_SPEED] * MAX_SPEED, before - change, before + change)
         self.velocity[slots] = velocity
         for slot, speed in zip(slots.tolist(), velocity.tolist(), strict=True):
             tool = self.tools[slot]
@@ -378,7 +380,7 @@ def throws(instances: Floats) -> tuple[Floats, Floats]:
 
 
 def is_held(points: Floats, balls: Floats, velocity: Floats) -> Booleans:
-    """Tell which balls (b, K) lie on tools with chain `points` (b, 4, 2).
+    """Return which balls (b, K) are held by tools with chain `points` (b, 4, 2).
 
     `balls` (b, K, 2) are centres, `velocity` (b, K, 2) velocities, both as seen from the hand. What is slow above a
     link and stays so lies on it: nothing else is there that could carry it. Above the hand's height it does not count,

@@ -269,10 +269,11 @@ class Scoop(Task):
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
         """Return (count, I) instances: number and pile all alike often, shift uniform."""
-        wanted = rng.integers(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1, size=count)
-        pile = rng.integers(NUM_PILES, size=count)
-        shift = rng.uniform(-START_SHIFT, START_SHIFT, size=count)
-        return np.stack([wanted, pile, shift], axis=1)
+        instances = np.zeros((count, INSTANCE.size))
+        instances[:, WANTED] = rng.integers(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1, size=count)
+        instances[:, PILE] = rng.integers(NUM_PILES, size=count)
+        instances[:, SHIFT] = rng.uniform(-START_SHIFT, START_SHIFT, size=count)
+        return instances
 
     def material(self, designs: Floats) -> Floats:
         """Return the used share of the largest total link length for designs (b, D) in their units."""
@@ -562,7 +563,7 @@ def distances(places: Floats, tool: Floats) -> Floats:
 
 
 def above(places: Floats, chains: Floats) -> Booleans:
-    """Tell which `places` (b, N, 2) are vertically above a link of the chains with points (b, 4, 2)."""
+    """Return which `places` (b, N, 2) are vertically above a link of the chains with points (b, 4, 2)."""
     start, link = chains[:, None, :-1], np.diff(chains, axis=1)[:, None]
     offset = places[:, :, None] - start
     wide = np.abs(link[..., 0]) > 1e-9

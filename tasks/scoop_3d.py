@@ -123,6 +123,8 @@ CONTROL_SCALE: Annotated[float, Given("m, rad", OURS, "control_action_scale")] =
 """From these bounds to a change of pose in a control step: 0.45 m/s and 0.71 rad/s. The paper's scale would be 1.5 m/s
 and 2.4 rad/s, at which balls are thrown about."""
 
+PILES: Annotated[int, Given("piles", OURS)] = 2**20
+"""Different piles."""
 POUR_COLUMNS: Annotated[int, Given("balls", OURS)] = 3
 """Balls that lie where the tool will are poured on it in layers of this many by this many."""
 POUR_GAP: Annotated[float, Given("m", OURS)] = 0.004
@@ -185,7 +187,7 @@ CONTROL = Box(
     units=("m", "m", "m", "rad", "rad", "rad"),
 )
 MOVE_UP, TURNS = CONTROL.index("move_z"), CONTROL.group("turn_")
-INSTANCE = Box.of(balls_wanted=(float(WANTED[0]), float(WANTED[1]), "balls"), pile=(0.0, 2.0**20 - 1.0, "1"))
+INSTANCE = Box.of(balls_wanted=(float(WANTED[0]), float(WANTED[1]), "balls"), pile=(0.0, PILES - 1.0, "1"))
 BALLS_WANTED, PILE = INSTANCE.index("balls_wanted"), INSTANCE.index("pile")
 STATE = Box.of(
     tool_x=(-0.1, 0.1, "m"),
@@ -257,7 +259,7 @@ class Scoop3D(Task):
 
     Goal space
         Whole numbers of balls (paper), each equally often. An instance also holds the number of a pile: how the balls
-        lie and how they are poured on the tool. Policies do not see it.
+        are placed and poured on the tool. Policies do not see it.
 
     Reward
         The change of a potential that grows as the tool is lifted and is the larger, the nearer the number of balls in
@@ -315,9 +317,10 @@ class Scoop3D(Task):
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
         """Return (count, I) random whole numbers of balls and piles."""
-        wanted = rng.integers(WANTED[0], WANTED[1], size=count, endpoint=True)
-        piles = rng.integers(0, int(self.instance_space.high[1]), size=count, endpoint=True)
-        return np.stack([wanted, piles], axis=1).astype(np.float64)
+        instances = np.zeros((count, INSTANCE.size))
+        instances[:, BALLS_WANTED] = rng.integers(WANTED[0], WANTED[1], size=count, endpoint=True)
+        instances[:, PILE] = rng.integers(0, PILES, size=count)
+        return instances
 
     def material(self, designs: Floats) -> Floats:
         """Return the area of the plates over the largest one for designs (b, D) in their units."""
@@ -624,13 +627,13 @@ def beyond_sides(designs: Floats, points: Floats) -> Floats:
 
 
 def above_bottom(designs: Floats, points: Floats) -> Booleans:
-    """Tell which `points` (b, n, 3), in the frame of tools (b, D), are above the bottom and between the sides."""
+    """Return which `points` (b, n, 3), in the frame of tools (b, D), are above the bottom and between the sides."""
     inside: Booleans = (beyond_sides(designs, points) < 2.0 * HALF_THICKNESS).all(axis=2) & (points[..., 2] > 0.0)
     return inside
 
 
 def touching(design: Floats, balls: Floats) -> Booleans:
-    """Tell which `balls` (N, 3) would touch the tool `design` (D,) or lie inside it."""
+    """Return which `balls` (N, 3) would touch the tool `design` (D,) or be inside it."""
     beyond = beyond_sides(design[None], balls[None])[0]
     near: Booleans = (beyond < 2.0 * HALF_THICKNESS + BALL_RADIUS + POUR_GAP).all(axis=1)
     return near

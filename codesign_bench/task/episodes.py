@@ -112,7 +112,7 @@ class Episodes:
         return reward, terminated, truncated
 
     def success(self, slots: Slots) -> Booleans:
-        """Tell which of `slots` (b,) hold a solved episode."""
+        """Return which of `slots` (b,) hold a solved episode."""
         return self.simulator.success[slots]
 
     def _observe(self, slots: Slots) -> None:

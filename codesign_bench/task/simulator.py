@@ -40,7 +40,7 @@ class Soundness:
     """Halving the physics step changes the outcome of a scripted episode by less than this, in the outcome's unit.
 
     It holds for the median episode; where contact is chaotic, for the mean over instances, and a two-sample
-    Kolmogorov-Smirnov test does not tell the outcomes' distributions apart.
+    Kolmogorov-Smirnov test finds no difference between the outcomes' distributions.
     """
     start_overlap: float = 1e-3
     """Right after the design step, no design overlaps anything deeper than this, m."""
@@ -98,7 +98,9 @@ class Simulator(ABC):
         """Reward `slots` (b,) by the sum of named terms, (b,) each, added up in the order given. For `step`."""
         total: NDArray[np.floating[Any]] | float = 0.0
         for index, (name, values) in enumerate(terms.items()):
-            self.reward_terms.setdefault(name, np.zeros(self.num_slots))[slots] = values
+            if name not in self.reward_terms:
+                self.reward_terms[name] = np.zeros(self.num_slots)
+            self.reward_terms[name][slots] = values
             total = values if index == 0 else total + values
         self.reward[slots] = total
 
@@ -110,9 +112,11 @@ class Simulator(ABC):
             steps: control steps in a row for which the conditions must hold.
             conditions: whether each holds now.
         """
-        met = np.ones(len(slots), dtype=bool)
+        met: Booleans = np.ones(len(slots), dtype=bool)
         for name, holds in conditions.items():
-            self.conditions.setdefault(name, np.zeros(self.num_slots, dtype=bool))[slots] = holds
+            if name not in self.conditions:
+                self.conditions[name] = np.zeros(self.num_slots, dtype=bool)
+            self.conditions[name][slots] = holds
             met &= holds
         self.met_steps[slots] = np.where(met, self.met_steps[slots] + 1, 0)
         self.success[slots] = self.met_steps[slots] >= steps
@@ -129,7 +133,7 @@ class Simulator(ABC):
         """Return what the scene in `slot` looks like to someone who checks its physics; changes nothing.
 
         Raises:
-            NotImplementedError: the task does not tell.
+            NotImplementedError: the task does not say.
         """
         raise NotImplementedError
 
@@ -137,7 +141,7 @@ class Simulator(ABC):
         """Return what the engine itself lets collide as the tool in `slot`, in the frame of the held point.
 
         Raises:
-            NotImplementedError: the task does not tell.
+            NotImplementedError: the task does not say.
         """
         raise NotImplementedError
 

@@ -68,7 +68,7 @@ class Box:
         """Return the positions of the entries `names`, which are neighbours in this order.
 
         Raises:
-            ValueError: there is no such entry, or others lie between them.
+            ValueError: there is no such entry, or others are between them.
         """
         positions = [self.index(name) for name in names]
         if not positions or positions != list(range(positions[0], positions[0] + len(positions))):
@@ -79,7 +79,7 @@ class Box:
         """Return the positions of all entries whose names start with `prefix`; they are neighbours.
 
         Raises:
-            ValueError: no entry's name does, or others lie between them.
+            ValueError: no entry's name does, or others are between them.
         """
         return self.slice(*(name for name in self.names if name.startswith(prefix)))
 
@@ -123,7 +123,7 @@ class Observed(NamedTuple):
     state: NDArray[Any]
     """(..., S) in the state space's units."""
     goal: NDArray[Any]
-    """(..., G) in the goal space's units; the goal is the first part of an instance, so its entries lie alike."""
+    """(..., G) in the goal space's units; an instance starts with the goal, so indices are the same."""
     design: NDArray[Any]
     """(..., D) in [-1, 1]."""
     phase: NDArray[Any]

@@ -104,7 +104,7 @@ class Task(ABC):
     def in_region(self, instances: Floats) -> Booleans:
         """Return which positions of instances (b, I) are in the training region, its border included.
 
-        By default the region is what lies between the bounds of `position_entries`.
+        By default the region is everything between the bounds of `position_entries`.
 
         Raises:
             UserError: no entry is a position.
@@ -145,9 +145,9 @@ class Task(ABC):
         they may overlap.
 
         Raises:
-            UserError: the task does not tell.
+            UserError: the task does not say.
         """
-        raise UserError(f"task '{self.name}' does not tell what its tools are made of")
+        raise UserError(f"task '{self.name}' does not say what its tools are made of")
 
     def script(self) -> Behaviour:
         """Return a designer and a controller written by hand, for pictures and checks: functions of the observation.

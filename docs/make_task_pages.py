@@ -197,7 +197,8 @@ def _cutout(task: Task) -> Iterator[str]:
         WIDTH,
     )
     if type(task).fine_tuning_instances is not Task.fine_tuning_instances:
-        yield _doc(type(task).fine_tuning_instances).removeprefix("Return ").capitalize()
+        told = _doc(type(task).fine_tuning_instances).removeprefix("Return ")
+        yield f"`--finetune N` tunes a policy further on one of {re.sub(r', [(][^)]*[)]', '', told)}"
         rows = (map(number, instance) for instance in task.fine_tuning_instances().tolist())
         yield _table(("`--finetune`", *task.instance_space.names), ((str(n + 1), *row) for n, row in enumerate(rows)))
 
@@ -212,7 +213,7 @@ def _tradeoff(task: Task) -> str:
 
 def _promises(task: Task) -> Iterator[str]:
     if task.outcome is not None:
-        yield f"The outcome, whatever the reward, is the {task.outcome.name} ({task.outcome.unit})."
+        yield f"The outcome, whatever the reward: {task.outcome.name} ({task.outcome.unit})."
     if task.soundness is None:
         return
     tree = ast.parse(inspect.getsource(simulator))

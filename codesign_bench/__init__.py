@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from codesign_bench.errors import UserError
     from codesign_bench.method import load_method, method_names
+    from codesign_bench.storage.frames import load_results
     from codesign_bench.storage.policies import load_policy
-    from codesign_bench.storage.results import load_results
     from codesign_bench.task import load_task, task_names
 
 __version__ = "0.1.0"
@@ -21,7 +21,7 @@ _HOMES = {
     "UserError": "errors",
     "load_method": "method",
     "load_policy": "storage.policies",
-    "load_results": "storage.results",
+    "load_results": "storage.frames",
     "load_task": "task",
     "method_names": "method",
     "task_names": "task",

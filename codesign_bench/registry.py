@@ -1,4 +1,4 @@
-"""Find tasks, methods and figures: a file in the folder is an entry, and so is an installed package's entry point.
+"""Find tasks, methods, figures and studies: a file in the folder is an entry, as is a package's entry point.
 
 Names are listed without importing anything, so that listing needs neither torch nor pybullet.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
@@ -19,17 +19,26 @@ from codesign_bench.errors import unknown_name
 IMPORTS_VARIABLE = "CODESIGN_BENCH_IMPORTS"
 """Environment variable through which `--import module` reaches the worker processes (module names, comma-separated)."""
 
+KINDS = {"methods": "method", "tasks": "task", "paper_figs": "figure", "studies": "study"}
+"""Groups of members, and what one of each is called."""
+
 _registered: dict[str, dict[str, Callable[[], Any]]] = {}
 
 
 def register(group: str, name: str, loader: Callable[[], Any]) -> None:
-    """Add the entry `name` to `group` ("methods" or "tasks"); `loader` returns its class. For `--import`."""
+    """Add the entry `name` to `group` (one of `KINDS`); `loader` returns its class or module. For `--import`."""
     _registered.setdefault(group, {})[name] = loader
 
 
 def names(group: str) -> tuple[str, ...]:
-    """Return every name in `group` ("methods", "tasks" or "paper_figs"): built-in files, entry points, `--import`."""
+    """Return every name in `group` (one of `KINDS`): built-in files, entry points, `--import`."""
     return tuple(dict.fromkeys((*_files(group), *sorted(_entry_points(group)), *sorted(_registered.get(group, {})))))
+
+
+def in_order(group: str, found: Iterable[str]) -> list[str]:
+    """Return the `found` names of `group`, each once, in the order of listings; unknown ones last, by name."""
+    present, known = set(found), names(group)
+    return [name for name in known if name in present] + sorted(present - set(known))
 
 
 def load(group: str, name: str, base: type) -> Any:
@@ -46,18 +55,40 @@ def load(group: str, name: str, base: type) -> Any:
         return single_subclass(loaded, base) if isinstance(loaded, ModuleType) else loaded
     if name in _registered.get(group, {}):
         return _registered[group][name]()
-    raise unknown_name(group.rstrip("s").replace("paper_fig", "figure"), name, names(group))
+    raise unknown_name(KINDS[group], name, names(group))
 
 
 def load_module(group: str, name: str) -> ModuleType:
-    """Return the module of the built-in entry `name` of `group` (figures are modules, not classes).
+    """Return the module of the entry `name` of `group` (figures and studies are modules, not classes).
 
     Raises:
         UserError: there is no such entry.
+        TypeError: it is something else than a module.
     """
-    if name not in _files(group):
-        raise unknown_name("figure" if group == "paper_figs" else group.rstrip("s"), name, _files(group))
-    return importlib.import_module(f"codesign_bench.{group}.{name}")
+    if name in _files(group):
+        return importlib.import_module(f"codesign_bench.{group}.{name}")
+    if name in _entry_points(group):
+        found = _entry_points(group)[name].load()
+    elif name in _registered.get(group, {}):
+        found = _registered[group][name]()
+    else:
+        raise unknown_name(KINDS[group], name, names(group))
+    if not isinstance(found, ModuleType):
+        raise TypeError(f"the {KINDS[group]} '{name}' must be a module, not {type(found).__name__}")
+    return found
+
+
+def load_attribute(group: str, name: str, attribute: str) -> Any:
+    """Return what the module of the entry `name` of `group` calls `attribute`.
+
+    Raises:
+        UserError: there is no such entry.
+        TypeError: its module has no such attribute.
+    """
+    module = load_module(group, name)
+    if not hasattr(module, attribute):
+        raise TypeError(f"{module.__name__} is registered as a {KINDS[group]} and must define {attribute}")
+    return getattr(module, attribute)
 
 
 def single_subclass(module: ModuleType, base: type) -> Any:

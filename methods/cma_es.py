@@ -13,13 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from codesign_bench.config.settings import Settings
 from codesign_bench.config.validation import check_range
-from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, paper_evolution
-from codesign_bench.learning.profiles import Tuned, tuned
+from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Booleans, Floats, Singles, Task
 from codesign_bench.task.episodes import portions
+
+from ._settings import Tuned, tuned
 
 PLAN = "plan"
 
@@ -80,9 +82,9 @@ class CmaEs(Method[Config]):
         self.evolution = Evolution(size, config, streams["plans"])
 
     @classmethod
-    def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
-        """Return the best of the paper's sweep, or what was tuned for this baseline."""
-        return paper_evolution() if profile == "paper" else tuned(profile, TUNED)
+    def profile(cls, profile: str, task_name: str) -> Settings:
+        """Return what was tuned for this baseline."""
+        return tuned(profile, TUNED)
 
     def train(self, remaining_steps: int) -> BatchReport:
         """Try one generation: every candidate on the same few instances; its fitness is the mean return.

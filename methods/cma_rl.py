@@ -15,19 +15,20 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from codesign_bench.config.settings import Settings
 from codesign_bench.learning.actor import Actor, ActorPolicy, load_module_arrays
-from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, paper_evolution
+from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
 from codesign_bench.learning.features import Features
 from codesign_bench.learning.gae import episode_returns
 from codesign_bench.learning.networks import MLP, RunningNorm, torch_generator
 from codesign_bench.learning.ppo_config import PerceptronConfig
-from codesign_bench.learning.profiles import Tuned, paper_perceptrons, ppo_profile, tuned
 from codesign_bench.learning.two_phase import TwoPhaseLearner
 from codesign_bench.learning.value_networks import MLPValue
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
-from codesign_bench.studies.corl2023.learners import CMA_RL
 from codesign_bench.task import Singles, Slots, Task
+
+from ._settings import Tuned, ppo_settings, tuned
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,10 +96,9 @@ class CmaRl(Method[Config]):
         self.learner = TwoPhaseLearner(problem, config, streams, self.actor, value, self._candidates)
 
     @classmethod
-    def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
-        """Return PPO's settings with the table's exceptions and CMA-ES's, or what was tuned for this baseline."""
-        exceptions = paper_perceptrons(CMA_RL, task_name) | paper_evolution() if profile == "paper" else {}
-        return ppo_profile(profile, task_name) | exceptions | tuned(profile, TUNED)
+    def profile(cls, profile: str, task_name: str) -> Settings:
+        """Return PPO's settings, with what was tuned for this baseline."""
+        return {**ppo_settings(profile, task_name), **tuned(profile, TUNED)}
 
     def use_cores(self, count: int) -> None:
         """Use up to `count` cores."""

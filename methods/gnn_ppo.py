@@ -5,20 +5,20 @@ Source: the paper, sections "Policy learning" and "Training Hyperparameters & Ar
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from torch import Tensor, nn
 
+from codesign_bench.config.settings import Settings
 from codesign_bench.learning.actor import Actor
 from codesign_bench.learning.graph_actor import GraphController, GraphDesigner
 from codesign_bench.learning.ppo_config import GraphConfig
 from codesign_bench.learning.ppo_method import PPOMethod
-from codesign_bench.learning.profiles import paper_graph_networks, ppo_profile
 from codesign_bench.learning.value_networks import GraphValue, ValueNetwork
 from codesign_bench.task import Task
+
+from ._settings import ppo_settings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,10 +66,9 @@ class GnnPpo(PPOMethod[Config]):
     config_class = Config
 
     @classmethod
-    def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
-        """Return the optimiser's and the networks' settings."""
-        networks = paper_graph_networks(task_name) if profile == "paper" else {}
-        return ppo_profile(profile, task_name) | networks
+    def profile(cls, profile: str, task_name: str) -> Settings:
+        """Return the optimiser's settings."""
+        return ppo_settings(profile, task_name)
 
     @classmethod
     def make_actor(cls, task: Task, config: Config, rng: np.random.Generator) -> Actor:

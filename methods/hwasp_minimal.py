@@ -7,21 +7,21 @@ optimiser settings of `gnn_ppo` (appendix "Training Hyperparameters & Architectu
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from codesign_bench.config.settings import Settings
 from codesign_bench.learning.actor import Actor
 from codesign_bench.learning.graph_actor import GraphController
 from codesign_bench.learning.ppo_config import GraphConfig
 from codesign_bench.learning.ppo_method import PPOMethod
-from codesign_bench.learning.profiles import Tuned, paper_graph_networks, ppo_profile, tuned
 from codesign_bench.learning.value_networks import GraphValue, ValueNetwork
 from codesign_bench.task import Task
+
+from ._settings import Tuned, ppo_settings, tuned
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,10 +72,9 @@ class HwaspMinimal(PPOMethod[Config]):
     config_class = Config
 
     @classmethod
-    def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
+    def profile(cls, profile: str, task_name: str) -> Settings:
         """Return `gnn_ppo`'s settings, with what was tuned for this baseline."""
-        networks = paper_graph_networks(task_name) if profile == "paper" else {}
-        return ppo_profile(profile, task_name) | networks | tuned(profile, TUNED)
+        return {**ppo_settings(profile, task_name), **tuned(profile, TUNED)}
 
     @classmethod
     def make_actor(cls, task: Task, config: Config, rng: np.random.Generator) -> Actor:

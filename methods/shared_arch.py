@@ -6,22 +6,24 @@ and value, with at least as many trainable parameters as `gnn_ppo` on every task
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from torch import Tensor, nn
 
+from codesign_bench.config.resolve import resolve
+from codesign_bench.config.settings import Settings, sourced
 from codesign_bench.learning.actor import Actor
 from codesign_bench.learning.features import Features
 from codesign_bench.learning.networks import MLP, RunningNorm, torch_generator
 from codesign_bench.learning.ppo_config import PerceptronConfig
 from codesign_bench.learning.ppo_method import PPOMethod
-from codesign_bench.learning.profiles import Tuned, paper_perceptrons, ppo_profile, sourced, tuned
 from codesign_bench.learning.value_networks import MLPValue, ValueNetwork
-from codesign_bench.studies.corl2023.learners import SHARED_ARCH
-from codesign_bench.task import Task
+from codesign_bench.method import Method, load_method
+from codesign_bench.task import Task, load_task
+
+from ._settings import Tuned, ppo_settings, tuned
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,20 +34,10 @@ class Config(PerceptronConfig):
 TUNED: Tuned = {"laptop": {}, "quick": {}}
 """What was tuned for this baseline (ours)."""
 
-WIDER: Mapping[tuple[str, str], int] = {
-    ("paper", "fetch_cube"): 288,
-    ("paper", "lift_cup"): 304,
-    ("paper", "scoop_3d"): 336,
-    ("laptop", "lift_cup"): 224,
-    ("laptop", "scoop_3d"): 224,
-    ("quick", "lift_cup"): 224,
-    ("quick", "scoop_3d"): 224,
-}
-"""Width of all layers where the profile's own would have fewer parameters than `gnn_ppo`'s networks.
-
-The paper's table says 256 everywhere and its text that no task has fewer parameters than the paper's own method; on the
-3D tasks only one of them can hold. We keep the text's promise, with the next multiple of 16.
-"""
+REFERENCE = "gnn_ppo"
+"""The method than which this one has no fewer trainable parameters, neither in its policy nor altogether (paper)."""
+WIDTH_STEP = 16
+"""Layers are widened by multiples of this where the profile's widths would have fewer parameters (ours)."""
 
 
 class SharedActor(Actor):
@@ -92,10 +84,29 @@ class SharedArch(PPOMethod[Config]):
     config_class = Config
 
     @classmethod
-    def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
-        """Return `gnn_ppo`'s optimiser settings with the table's exceptions, or what was tuned for this baseline."""
-        exceptions = paper_perceptrons(SHARED_ARCH, task_name) if profile == "paper" else {}
-        return ppo_profile(profile, task_name) | exceptions | tuned(profile, TUNED) | _wider(profile, task_name)
+    def profile(cls, profile: str, task_name: str) -> Settings:
+        """Return `gnn_ppo`'s optimiser settings, with what was tuned for this baseline."""
+        return {**ppo_settings(profile, task_name), **tuned(profile, TUNED)}
+
+    @classmethod
+    def derived(cls, config: Config, profile: str, task_name: str) -> Settings:
+        """Return wider layers where the profile's own would have fewer parameters than the paper's own method.
+
+        The paper's table says 256 everywhere and its text that no task has fewer parameters than the paper's own
+        method; on the 3D tasks only one of them can hold. We keep the text's promise.
+        """
+        task, reference = load_task(task_name), load_method(REFERENCE)
+        needed = parameter_counts(reference, task, resolve(reference, task_name, profile).method)
+        widened = config
+        while any(own < other for own, other in zip(parameter_counts(cls, task, widened), needed, strict=True)):
+            policy_net, value_net = (
+                tuple(width + WIDTH_STEP for width in layers) for layers in (widened.policy_net, widened.value_net)
+            )
+            widened = replace(widened, policy_net=policy_net, value_net=value_net)
+        if widened == config:
+            return {}
+        widths = {"policy_net": widened.policy_net, "value_net": widened.value_net}
+        return sourced(widths, "paper, text: no fewer parameters than the paper's own method")
 
     @classmethod
     def make_actor(cls, task: Task, config: Config, rng: np.random.Generator) -> Actor:
@@ -108,13 +119,12 @@ class SharedArch(PPOMethod[Config]):
         return MLPValue(task, config.value_net, rng)
 
 
-def _wider(profile: str, task_name: str) -> dict[str, tuple[Any, str]]:
-    """Return the networks' widths where the profile's own would have too few parameters."""
-    width = WIDER.get((profile, task_name))
-    if width is None:
-        return {}
-    layers = len(SHARED_ARCH.policy_net) if profile == "paper" else len(Config().policy_net)
-    return sourced(
-        dict.fromkeys(("policy_net", "value_net"), (width,) * layers),
-        "paper, text: no fewer parameters than the paper's own method",
+def parameter_counts(method_class: type[Method[Any]], task: Task, config: Any) -> tuple[int, int]:
+    """Return how many parameters a PPO-based method trains: those of its policy, and those of all its networks."""
+    assert issubclass(method_class, PPOMethod)
+    rng = np.random.default_rng(0)
+    policy, value = (
+        sum(parameter.numel() for parameter in network.parameters() if parameter.requires_grad)
+        for network in (method_class.make_actor(task, config, rng), method_class.make_value(task, config, rng))
     )
+    return policy, policy + value

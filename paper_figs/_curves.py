@@ -12,7 +12,7 @@ from matplotlib.ticker import EngFormatter, MaxNLocator
 
 from codesign_bench.errors import UserError
 from codesign_bench.figures.comparison import is_compared
-from codesign_bench.storage.results import DEFAULT_VARIANT
+from codesign_bench.storage.frames import default_rows, require_columns
 
 from ._order import task_order
 from ._style import BAND_OPACITY, COLUMN_WIDTH, PAGE_WIDTH, Dashes, in_order, line_styles, style
@@ -27,18 +27,17 @@ SLIVER = 0.05
 NEEDED = ("env_steps", "task", "method", "variant", "seed", *QUANTITIES)
 
 
-def default_rows(frame: pd.DataFrame, figure_name: str) -> pd.DataFrame:
+def evaluated_rows(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the evaluated rows of the variant `default` of a frame as `codesign_bench.load_results` gives it.
 
     Raises:
         UserError: a column, or every row of the default variant, is missing.
     """
-    missing = [column for column in NEEDED if column not in frame.columns]
-    if missing:
-        raise UserError(f"{figure_name}: the results lack the columns {', '.join(missing)}")
-    rows = frame[(frame["variant"] == DEFAULT_VARIANT) & frame["return_mean"].notna()]
+    require_columns(frame, NEEDED, "the results")
+    rows = default_rows(frame)
+    rows = rows[rows["return_mean"].notna()]
     if rows.empty:
-        raise UserError(f"{figure_name}: no evaluated cell of variant 'default'; run some with: codesign-bench run")
+        raise UserError("no evaluated cell of variant 'default'")
     return rows
 
 

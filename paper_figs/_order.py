@@ -1,4 +1,4 @@
-"""The order of tasks in figures."""
+"""The order of tasks in figures: that of listings."""
 
 from __future__ import annotations
 
@@ -6,13 +6,12 @@ from collections.abc import Iterable
 
 import pandas as pd
 
-from codesign_bench.studies.corl2023.scenes import SCENES
+from codesign_bench.registry import in_order
 
 
 def task_order(tasks: Iterable[str]) -> list[str]:
-    """Return the tasks in the paper's order, those of third parties last, by name."""
-    present = set(tasks)
-    return [name for name in SCENES if name in present] + sorted(present - set(SCENES))
+    """Return the tasks in the order of listings, unknown ones last, by name."""
+    return in_order("tasks", tasks)
 
 
 def in_task_order(frame: pd.DataFrame) -> pd.DataFrame:

@@ -13,6 +13,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 
 from codesign_bench.figures.comparison import is_compared, method_of
+from codesign_bench.registry import in_order as in_listed_order
 
 mpl.use("Agg")
 
@@ -28,7 +29,10 @@ COLOURS = {
 """Colour of each of the paper's five methods, in the order of its legends."""
 
 OTHER_COLOURS = ("#56B4E9", "#000000", "#999999")
-"""Colours of third-party methods, in turn; where they run out, the dashes change."""
+"""Colours of all other methods, in turn; where they run out, the dashes change."""
+
+BLUE, ORANGE, GREEN, RED, PINK, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#999999"
+"""The same palette for whatever is no method."""
 
 DASHES: tuple[Dashes, ...] = ("-", "--", "-.")
 
@@ -61,9 +65,10 @@ SETTINGS = {
 
 
 def in_order(methods: Iterable[str]) -> list[str]:
-    """Return the methods in the order of legends: the paper's five, then others by name; compared results last."""
-    ranks = {name: rank for rank, name in enumerate(COLOURS)}
-    return sorted(set(methods), key=lambda name: (is_compared(name), ranks.get(method_of(name), len(ranks)), name))
+    """Return the methods in the order of listings, unknown ones by name; compared results last."""
+    present = set(methods)
+    ranks = {name: rank for rank, name in enumerate(in_listed_order("methods", {method_of(name) for name in present}))}
+    return sorted(present, key=lambda name: (is_compared(name), ranks[method_of(name)], name))
 
 
 def line_styles(methods: Iterable[str]) -> dict[str, tuple[str, Dashes]]:

@@ -6,7 +6,7 @@ import pandas as pd
 from matplotlib.figure import SubFigure
 
 from ._pictures import cut_to_differences, show
-from ._style import COLOURS
+from ._style import RED
 
 NEEDED = (
     *("task", "title", "method", "label", "variant", "alpha", "seed", "instance", "success"),
@@ -14,7 +14,7 @@ NEEDED = (
 )
 """Columns of a frame of tools, as `codesign_bench.figures.designed_tools` makes it."""
 
-UNSOLVED_COLOUR, UNSOLVED_WIDTH = COLOURS["hwasp_minimal"], 1.5
+UNSOLVED_COLOUR, UNSOLVED_WIDTH = RED, 1.5
 UNSOLVED_NOTE = "thick frame: the episode that followed did not succeed"
 HEADER_HEIGHT = 0.36
 """Room for title and labels, in inches."""

@@ -8,13 +8,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from codesign_bench.errors import UserError
+from codesign_bench.storage.frames import require_columns
+from codesign_bench.studies.corl2023.baseline_sweep import load_sweep
 from codesign_bench.text_tables import latex, markdown
 
-from ._style import COLOURS, PAGE_WIDTH, style
+from ._style import BLUE, PAGE_WIDTH, RED, style
 
 TITLE = "Sweep of the CMA-ES baseline"
-SOURCE = "baseline_sweep"
+SOURCE = load_sweep
+NEEDS = "codesign-bench reproduce baseline_sweep"
 PARAMETERS = {
     "popsize": "population size",
     "sigma0": "initial deviation",
@@ -25,7 +27,7 @@ PARAMETERS = {
 }
 """Columns that were swept and their names on the axes, as in the paper's table."""
 NEEDED = (*PARAMETERS, "rung", "budget", "paper_best", "env_steps", "return_mean", "kept")
-CHOSEN_COLOUR, PAPER_COLOUR = COLOURS["hwasp_minimal"], COLOURS["gnn_ppo"]
+CHOSEN_COLOUR, PAPER_COLOUR = RED, BLUE
 
 
 def data(frame: pd.DataFrame) -> pd.DataFrame:
@@ -37,9 +39,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column is missing, or there is no row.
     """
-    missing = [column for column in NEEDED if column not in frame.columns]
-    if missing or frame.empty:
-        raise UserError(f"baseline_sweep: the table lacks {', '.join(missing) if missing else 'every row'}")
+    require_columns(frame, NEEDED, "the settings tried")
     best = _chosen(frame)
     same = np.logical_and.reduce([frame[name] == best[name] for name in PARAMETERS])
     return frame.assign(chosen=same.astype(int))

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Rectangle
 
-from codesign_bench.errors import UserError
+from codesign_bench.figures.source import trials_on_an_arm
+from codesign_bench.storage.frames import require_columns
 from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 from codesign_bench.text_tables import latex, markdown
 
@@ -19,7 +20,8 @@ from ._order import task_order
 from ._style import PAGE_WIDTH, draw_table, style
 
 TITLE = "Deployment on a simulated arm"
-SOURCE = "deployment"
+SOURCE = trials_on_an_arm
+NEEDS = "codesign-bench deploy --policy CELL --protocol"
 OWN, GRID = "own", "grid"
 NEEDED = (
     *("task", "kind", "tool", "trial", "row", "column", "success", "near", "steps"),
@@ -52,9 +54,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column is missing, or there is no row.
     """
-    missing = [column for column in NEEDED if column not in frame.columns]
-    if missing or frame.empty:
-        raise UserError(f"deployment: the trials lack {', '.join(missing) if missing else 'every row'}")
+    require_columns(frame, NEEDED, "the trials")
     rows = []
     for task in task_order(frame["task"]):
         for kind in (OWN, GRID):

@@ -12,13 +12,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from codesign_bench.errors import UserError
+from codesign_bench.figures import source
+from codesign_bench.storage.frames import require_columns
 
 from ._order import task_order
-from ._style import COLOURS, COLUMN_WIDTH, PAGE_WIDTH, Dashes, style
+from ._style import BLUE, COLUMN_WIDTH, GREEN, PAGE_WIDTH, RED, Dashes, style
 
 TITLE = "Design sensitivity"
-SOURCE = "design_sensitivity"
+SOURCE = source.design_sensitivity
+NEEDS = "codesign-bench plot design_sensitivity"
 NEEDED = ("task", "tool", "kind", "goal", "own", "outcome", "success", "outcome_name", "outcome_unit")
 PANELS_PER_ROW = 3
 PANEL_HEIGHT = 1.5
@@ -26,9 +28,9 @@ PANEL_HEIGHT = 1.5
 BINS = 16
 
 MARKS: dict[str, tuple[str, Dashes, str]] = {
-    "best_single": (COLOURS["hwasp_minimal"], "-", "best single tool"),
-    "own": (COLOURS["gnn_ppo"], "-", "script's own tool for each goal"),
-    "any": (COLOURS["cma_rl"], "--", "some tool solves the goal"),
+    "best_single": (RED, "-", "best single tool"),
+    "own": (BLUE, "-", "script's own tool for each goal"),
+    "any": (GREEN, "--", "some tool solves the goal"),
 }
 """Lines in the lower panels: column of `data`, then colour, dashes and legend."""
 
@@ -49,9 +51,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column is missing, or there is no row.
     """
-    missing = [column for column in NEEDED if column not in frame.columns]
-    if missing or frame.empty:
-        raise UserError(f"design_sensitivity: the table lacks {', '.join(missing) if missing else 'every row'}")
+    require_columns(frame, NEEDED, "the outcomes")
     return pd.DataFrame([_summary(str(name), frame[frame["task"] == name]) for name in task_order(frame["task"])])
 
 

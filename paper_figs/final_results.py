@@ -12,15 +12,18 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from codesign_bench.cell.variant import DEFAULT_NAME
+from codesign_bench.figures.source import curves
 from codesign_bench.stats import CONFIDENCE, MIN_SEEDS, final_rng, final_values, mean_interval
-from codesign_bench.storage.results import DEFAULT_VARIANT
 from codesign_bench.text_tables import latex, markdown
 
-from ._curves import PANELS_PER_ROW, QUANTITIES, default_rows, method_labels
+from ._curves import PANELS_PER_ROW, QUANTITIES, evaluated_rows, method_labels
 from ._order import task_order
 from ._style import PAGE_WIDTH, in_order, line_styles, style
 
 TITLE = "Final results"
+SOURCE = curves
+NEEDS = "codesign-bench run --method all --task T --seeds 6"
 ROW_HEIGHT = 0.17
 """Of a method in a panel, in inches."""
 INTERVAL = (
@@ -46,7 +49,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column, or every row of the default variant, is missing.
     """
-    rows = default_rows(frame, "final_results")
+    rows = evaluated_rows(frame)
     labels = method_labels(frame)
     finals = {name: final_values(rows, name) for name in (*QUANTITIES, "wall_s")}
     result = []
@@ -62,7 +65,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
             }
             for name in QUANTITIES:
                 values = own[name][name].to_numpy()
-                low, high = mean_interval(values, final_rng(task, method, DEFAULT_VARIANT, name))
+                low, high = mean_interval(values, final_rng(task, method, DEFAULT_NAME, name))
                 row |= {name: float(values.mean()), f"{name}_low": low, f"{name}_high": high}
             result.append({**row, "minutes": float(own["wall_s"]["wall_s"].median()) / 60.0})
     return pd.DataFrame(result)

@@ -11,17 +11,21 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from codesign_bench.errors import UserError
+from codesign_bench.figures.source import curves
 from codesign_bench.stats import MIN_SEEDS, curve_statistics
+from codesign_bench.storage.frames import require_columns, rows_varying
 
 from ._curves import draw_curve
-from ._style import COLOURS, COLUMN_WIDTH, PAGE_WIDTH, style
+from ._style import BLUE, COLUMN_WIDTH, ORANGE, PAGE_WIDTH, style
 
 TITLE = "Fine-tuning"
+SOURCE = curves
+NEEDS = "codesign-bench reproduce fine_tuning"
 KINDS = {
-    "finetune": ("from the trained policy", COLOURS["gnn_ppo"]),
-    "scratch": ("from scratch", COLOURS["shared_arch"]),
+    "finetune": ("from the trained policy", BLUE),
+    "scratch": ("from scratch", ORANGE),
 }
-"""Kind of cell, the beginning of its variant's name: its name in the legend, and its colour."""
+"""Axis that cells vary: its name in the legend, and its colour."""
 INTERVAL = (
     f"line: mean over seeds; dotted: not all seeds got this far; band: ± standard error, if {MIN_SEEDS} seeds or more"
 )
@@ -33,8 +37,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the numbers that the figure shows.
 
     Args:
-        frame: rows as `codesign_bench.load_results` gives them; variants other than `finetune-k` and `scratch-k` are
-            left out.
+        frame: rows as `codesign_bench.load_results` gives them; cells that vary something else are left out.
 
     Returns:
         Columns task, method, start (k), kind ("finetune" or "scratch"), gradient_steps, mean, standard_error, seeds.
@@ -42,19 +45,22 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column, or every such variant, is missing.
     """
-    missing = [column for column in NEEDED if column not in frame.columns]
-    if missing:
-        raise UserError(f"fine_tuning: the results lack the columns {', '.join(missing)}")
-    parts = frame["variant"].str.extract(r"^(?P<kind>finetune|scratch)-(?P<start>\d+)$")
-    rows = frame[parts["kind"].notna()]
-    if rows.empty:
-        raise UserError("fine_tuning: no cell of --finetune or --scratch; run: codesign-bench reproduce fine_tuning")
-    along = rows.drop(columns="env_steps", errors="ignore").rename(columns={"gradient_steps": "env_steps"})
-    table = curve_statistics(along, "return_mean").rename(columns={"env_steps": "gradient_steps"})
-    names = table["variant"].str.split("-", expand=True)
-    table = table.assign(kind=names[0], start=names[1].astype(int))
+    require_columns(frame, NEEDED, "the results")
+    table = pd.concat([_along_gradient_steps(rows_varying(frame, kind), kind) for kind in KINDS])
+    if table.empty:
+        raise UserError("no cell of --finetune or --scratch")
     columns = ["task", "method", "start", "kind", "gradient_steps", "mean", "standard_error", "seeds"]
     return table[columns].sort_values(columns[:5], ignore_index=True)
+
+
+def _along_gradient_steps(rows: pd.DataFrame, kind: str) -> pd.DataFrame:
+    """Return statistics over seeds along the gradient steps of cells that vary the axis `kind`, start by start."""
+    tables = []
+    for start in sorted(rows[kind].unique()):
+        own = rows[rows[kind] == start].drop(columns="env_steps", errors="ignore")
+        table = curve_statistics(own.rename(columns={"gradient_steps": "env_steps"}), "return_mean")
+        tables.append(table.rename(columns={"env_steps": "gradient_steps"}).assign(kind=kind, start=int(start)))
+    return pd.concat(tables) if tables else pd.DataFrame()
 
 
 def draw(frame: pd.DataFrame) -> Figure:

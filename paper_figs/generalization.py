@@ -13,14 +13,16 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import PercentFormatter
 
-from codesign_bench.errors import UserError
+from codesign_bench.figures.generalization import outcomes_by_region
 from codesign_bench.stats import MIN_SEEDS, mean, standard_error
+from codesign_bench.storage.frames import require_columns
 
 from ._order import task_order
-from ._style import COLOURS, PAGE_WIDTH, Dashes, in_order, style
+from ._style import GREEN, ORANGE, PAGE_WIDTH, PINK, Dashes, in_order, style
 
 TITLE = "Generalisation to unseen goals"
-SOURCE = "generalization"
+SOURCE = outcomes_by_region
+NEEDS = "codesign-bench run --method M --task T --seeds 3 --cutout 0.1 0.2 0.4 0.6 0.8 0.9"
 NEEDED = (
     *("task", "method", "label", "cutout", "seed", "instance", "return", "success"),
     *("kind", "region", "x", "y", "x_label", "y_label"),
@@ -31,9 +33,9 @@ PANEL_HEIGHT = 2.1
 """Height of a row of panels, in inches."""
 
 REGIONS: dict[str, tuple[str, Dashes, str, str]] = {
-    "training": (COLOURS["cma_rl"], "-", "o", "training region"),
-    "cutout": (COLOURS["shared_arch"], "--", "s", "cutout region (unseen)"),
-    "outside": (COLOURS["cma_es"], "-.", "^", "outside the training region (unseen)"),
+    "training": (GREEN, "-", "o", "training region"),
+    "cutout": (ORANGE, "--", "s", "cutout region (unseen)"),
+    "outside": (PINK, "-.", "^", "outside the training region (unseen)"),
 }
 """Regions: colour, dashes, marker and name."""
 NOTE = f"right: mean over seeds; bars: ± standard error, if {MIN_SEEDS} seeds or more"
@@ -105,10 +107,9 @@ def texts(frame: pd.DataFrame) -> dict[str, str]:
 
 
 def _starts(frame: pd.DataFrame) -> pd.DataFrame:
-    missing = [column for column in NEEDED if column not in frame.columns]
-    starts = frame if missing else frame[frame["kind"] == "start"]
-    if missing or starts.empty:
-        raise UserError(f"generalization: the evaluations lack {', '.join(missing) if missing else 'every row'}")
+    require_columns(frame, NEEDED, "the evaluations")
+    starts = frame[frame["kind"] == "start"]
+    require_columns(starts, NEEDED, "the evaluations")
     return starts
 
 

@@ -16,7 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from codesign_bench.errors import UserError
+from codesign_bench.storage.frames import require_columns
+from codesign_bench.studies.corl2023.hyperparameters import hyperparameters_of_results
 from codesign_bench.studies.corl2023.learners import LearnerTable
 from codesign_bench.text_tables import latex, markdown
 
@@ -24,7 +25,7 @@ from ._order import task_order
 from ._style import PAGE_WIDTH, in_order, style
 
 TITLE = "Hyperparameters"
-SOURCE = "hyperparameters"
+SOURCE = hyperparameters_of_results
 PROFILES = ("paper", "laptop")
 NEEDED = ("task", "method", "label", "name", *PROFILES, *(f"{profile}_source" for profile in PROFILES))
 SCENE, OWN = "scene", "gnn_ppo"
@@ -70,9 +71,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column is missing, or there is no row.
     """
-    missing = [column for column in NEEDED if column not in frame.columns]
-    if missing or frame.empty:
-        raise UserError(f"hyperparameter_tables: the settings lack {', '.join(missing) if missing else 'every row'}")
+    require_columns(frame, NEEDED, "the settings")
     rank = {name: position for position, name in enumerate(task_order(frame["task"]))}
     ordered = frame.sort_values("task", key=lambda tasks: tasks.map(rank), kind="stable")
     return ordered.assign(printed=[_printed(name) for name in ordered["name"]]).reset_index(drop=True)

@@ -9,11 +9,14 @@ from __future__ import annotations
 import pandas as pd
 from matplotlib.figure import Figure
 
+from codesign_bench.figures.source import curves
 from codesign_bench.stats import MIN_SEEDS, curve_statistics
 
-from ._curves import QUANTITIES, default_rows, draw_curves, method_labels
+from ._curves import QUANTITIES, draw_curves, evaluated_rows, method_labels
 
 TITLE = "Learning curves"
+SOURCE = curves
+NEEDS = "codesign-bench run --method all --task T --seeds 6"
 COMPARES = True
 """Whether `plot --compare` adds the curves of other results."""
 
@@ -36,7 +39,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column, or every row of the default variant, is missing.
     """
-    rows = default_rows(frame, "learning_curves")
+    rows = evaluated_rows(frame)
     tables = [curve_statistics(rows, quantity).assign(quantity=quantity) for quantity in QUANTITIES]
     columns = ["task", "method", "quantity", "env_steps", "mean", "standard_error", "seeds"]
     return pd.concat(tables, ignore_index=True)[columns]

@@ -8,12 +8,15 @@ from __future__ import annotations
 import pandas as pd
 from matplotlib.figure import Figure
 
+from codesign_bench.figures.source import curves
 from codesign_bench.seeding import generator
 from codesign_bench.stats import CONFIDENCE, MIN_SEEDS, curve_intervals
 
-from ._curves import QUANTITIES, default_rows, draw_curves, method_labels
+from ._curves import QUANTITIES, draw_curves, evaluated_rows, method_labels
 
 TITLE = "Learning curves, interquartile mean"
+SOURCE = curves
+NEEDS = "codesign-bench run --method all --task T --seeds 6"
 COMPARES = True
 """Whether `plot --compare` adds the curves of other results."""
 
@@ -37,7 +40,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column, or every row of the default variant, is missing.
     """
-    rows, rng = default_rows(frame, "learning_curves_iqm"), generator(0, "learning_curves_iqm")
+    rows, rng = evaluated_rows(frame), generator(0, "learning_curves_iqm")
     tables = [curve_intervals(rows, quantity, rng).assign(quantity=quantity) for quantity in QUANTITIES]
     columns = ["task", "method", "quantity", "env_steps", "interquartile_mean", "low", "high", "seeds"]
     return pd.concat(tables, ignore_index=True)[columns]

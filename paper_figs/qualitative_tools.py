@@ -11,14 +11,16 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from codesign_bench.errors import UserError
-from codesign_bench.storage.results import DEFAULT_VARIANT
+from codesign_bench.figures.designed_tools import designed_tools
+from codesign_bench.storage.frames import default_rows, require_columns
 
 from ._order import in_task_order
 from ._style import COLUMN_WIDTH, PAGE_WIDTH, style
 from ._tool_grid import NEEDED, UNSOLVED_NOTE, cut_alike, draw_grid, grid_height, is_map
 
 TITLE = "Tools over goals"
-SOURCE = "designed_tools"
+SOURCE = designed_tools
+NEEDS = "codesign-bench run --method M --task T"
 MAPS_PER_ROW = 3
 
 
@@ -65,10 +67,8 @@ def draw(frame: pd.DataFrame) -> Figure:
 
 
 def _rows(frame: pd.DataFrame) -> pd.DataFrame:
-    missing = [column for column in NEEDED if column not in frame.columns]
-    if missing:
-        raise UserError(f"qualitative_tools: the tools lack the columns {', '.join(missing)}")
-    rows = frame[frame["variant"] == DEFAULT_VARIANT]
+    require_columns(frame, NEEDED, "the tools")
+    rows = default_rows(frame)
     if rows.empty:
-        raise UserError("qualitative_tools: no finished cell of variant 'default'; run some with: codesign-bench run")
+        raise UserError("no finished cell of variant 'default'")
     return in_task_order(rows)

@@ -7,14 +7,15 @@ import math
 import pandas as pd
 from matplotlib.figure import Figure
 
-from codesign_bench.errors import UserError
+from codesign_bench.figures.task_pictures import tasks_at_work
+from codesign_bench.storage.frames import require_columns
 
 from ._order import in_task_order
 from ._pictures import cut_to_content, show
 from ._style import COLUMN_WIDTH, PAGE_WIDTH, style
 
 TITLE = "Tasks"
-SOURCE = "tasks_at_work"
+SOURCE = tasks_at_work
 NEEDED = ("task", "title", "instance", "step", "steps", "return", "success", "picture")
 PICTURES_PER_ROW = 3
 TITLE_HEIGHT = 0.2
@@ -63,7 +64,5 @@ def draw(frame: pd.DataFrame) -> Figure:
 
 
 def _rows(frame: pd.DataFrame) -> pd.DataFrame:
-    missing = [column for column in NEEDED if column not in frame.columns]
-    if missing or frame.empty:
-        raise UserError(f"task_gallery: the pictures lack {', '.join(missing) if missing else 'every row'}")
+    require_columns(frame, NEEDED, "the pictures")
     return in_task_order(frame)

@@ -9,7 +9,8 @@ from __future__ import annotations
 import pandas as pd
 from matplotlib.figure import Figure
 
-from codesign_bench.errors import UserError
+from codesign_bench.figures.source import timing
+from codesign_bench.storage.frames import require_columns
 from codesign_bench.studies.corl2023.protocol import PROTOCOL, TIMINGS
 from codesign_bench.text_tables import latex, markdown
 
@@ -17,7 +18,8 @@ from ._order import task_order
 from ._style import PAGE_WIDTH, draw_table, in_order, style
 
 TITLE = "Training and inference time"
-SOURCE = "timing"
+SOURCE = timing
+NEEDS = "codesign-bench run --method all --task T"
 NEEDED = ("task", "method", "label", "seed", "profile", "env_steps", "train_s", "cores", "cpu", "inference_s")
 PAPER_TASK = "fetch_cube"
 """The task of the paper's table."""
@@ -38,9 +40,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column is missing, or there is no row.
     """
-    missing = [column for column in NEEDED if column not in frame.columns]
-    if missing or frame.empty:
-        raise UserError(f"timing_table: the records lack {', '.join(missing) if missing else 'every row'}")
+    require_columns(frame, NEEDED, "the records")
     return pd.DataFrame([_row(frame, task, method) for task, method in _pairs(frame)])
 
 

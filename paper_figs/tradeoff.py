@@ -13,13 +13,16 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from codesign_bench.errors import UserError
+from codesign_bench.figures.source import evaluations
 from codesign_bench.stats import MIN_SEEDS, mean, standard_error
+from codesign_bench.storage.frames import require_columns, rows_varying
 
 from ._order import task_order
 from ._style import PAGE_WIDTH, Dashes, in_order, line_styles, style
 
 TITLE = "Trade-off of design and control"
-SOURCE = "evaluations"
+SOURCE = evaluations
+NEEDS = "codesign-bench run --method M --task T --seeds 3 --alpha 0 0.3 0.7 1"
 NEEDED = ("task", "method", "label", "variant", "alpha", "seed", "material", "effort")
 PANEL_HEIGHT = 1.7
 """Height of a row of panels, in inches."""
@@ -40,8 +43,8 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the numbers that the figure shows.
 
     Args:
-        frame: rows as `codesign_bench.storage.results.load_evaluations` gives them; variants other than `alpha-...`
-            are left out. The ratio of a seed is its mean material over its mean effort (NaN where nothing moved).
+        frame: rows as `codesign_bench.storage.frames.load_evaluations` gives them; cells that vary anything but
+            alpha are left out. The ratio of a seed is its mean material over its mean effort (NaN where nothing moved).
 
     Returns:
         Columns task, method, label, quantity ("ratio", "material" or "effort"), alpha, mean, standard_error (NaN for
@@ -50,14 +53,10 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column, or every cell with an alpha, is missing.
     """
-    missing = [column for column in NEEDED if column not in frame.columns]
-    if missing:
-        raise UserError(f"tradeoff: the evaluations lack the columns {', '.join(missing)}")
-    rows = frame[frame["variant"].str.fullmatch(r"alpha-[\d.]+")]
+    require_columns(frame, NEEDED, "the evaluations")
+    rows = rows_varying(frame, "alpha")
     if rows.empty:
-        raise UserError(
-            "tradeoff: no finished cell with an alpha; run some with: codesign-bench run --alpha 0 0.3 0.7 1"
-        )
+        raise UserError("no finished cell with an alpha")
     keys = ["task", "method", "label", "alpha"]
     seeds = rows.groupby([*keys, "seed"], as_index=False)[["material", "effort"]].mean()
     seeds["ratio"] = seeds["material"] / seeds["effort"].where(seeds["effort"] > 0.0)

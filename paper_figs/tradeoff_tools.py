@@ -10,13 +10,16 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from codesign_bench.errors import UserError
+from codesign_bench.figures.designed_tools import designed_tools
+from codesign_bench.storage.frames import require_columns, rows_varying
 
 from ._order import in_task_order
 from ._style import PAGE_WIDTH, style
 from ._tool_grid import NEEDED, UNSOLVED_NOTE, cut_alike, draw_grid, grid_height
 
 TITLE = "Tools over the trade-off"
-SOURCE = "designed_tools"
+SOURCE = designed_tools
+NEEDS = "codesign-bench run --method M --task T --alpha 0 0.3 0.7 1"
 ALSO_NEEDED = ("material",)
 PICTURES = 6
 """Most pictures of one designer, spread over its goals."""
@@ -26,7 +29,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return what each picture shows.
 
     Args:
-        frame: as `codesign_bench.figures.designed_tools` makes it; variants other than `alpha-...` are left out.
+        frame: as `codesign_bench.figures.designed_tools` makes it; cells that vary anything but alpha are left out.
 
     Returns:
         The rows drawn, without pictures, by task and alpha; columns that no row fills are left out.
@@ -59,12 +62,10 @@ def draw(frame: pd.DataFrame) -> Figure:
 
 
 def _rows(frame: pd.DataFrame) -> pd.DataFrame:
-    missing = [column for column in (*NEEDED, *ALSO_NEEDED) if column not in frame.columns]
-    if missing:
-        raise UserError(f"tradeoff_tools: the tools lack the columns {', '.join(missing)}")
-    rows = frame[frame["variant"].str.fullmatch(r"alpha-[\d.]+")]
+    require_columns(frame, (*NEEDED, *ALSO_NEEDED), "the tools")
+    rows = rows_varying(frame, "alpha")
     if rows.empty:
-        raise UserError("tradeoff_tools: no finished cell with an alpha; run some with: codesign-bench run --alpha 0 1")
+        raise UserError("no finished cell with an alpha")
     parts = [_in_a_row(grid) for _, grid in in_task_order(rows).groupby(["task", "alpha"], sort=True)]
     return in_task_order(pd.concat(parts, ignore_index=True))
 

@@ -14,10 +14,10 @@ from functools import lru_cache
 from pathlib import Path
 
 import codesign_bench as cb
-from codesign_bench.claims.evidence import Measure, load_evidence
+from codesign_bench.claims.evidence import load_evidence
 from codesign_bench.claims.verify import Row, by_rule, contradicted, judge
 from codesign_bench.registry import load_module
-from codesign_bench.studies.corl2023.claims import CLAIMS, OUTSIDE
+from codesign_bench.study import DEFAULT_STUDY, load_study
 
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "results" / "reference"
@@ -38,7 +38,8 @@ def _success(results: Path) -> str:
 
 @lru_cache
 def _judged(results: Path) -> list[Row]:
-    return judge(CLAIMS, load_evidence(results, Measure(False, OUTSIDE, print)), results.relative_to(ROOT).as_posix())
+    claims = load_study(DEFAULT_STUDY).claims()
+    return judge(claims, load_evidence(results), results.relative_to(ROOT).as_posix())
 
 
 MAKERS: dict[str, Callable[[Path], str]] = {

@@ -9,23 +9,14 @@ from __future__ import annotations
 import argparse
 import shutil
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
+from codesign_bench.cell.variant import DEFAULT
 from codesign_bench.errors import UserError
-from codesign_bench.storage.results import (
-    CELL_FILE,
-    CURVE_FILE,
-    DEFAULT_VARIANT,
-    DONE,
-    EVALUATION_FILE,
-    METRICS_FILE,
-    POLICY_FILE,
-    find_cells,
-    open_folder,
-)
-from codesign_bench.studies.corl2023.experiments import OURS
+from codesign_bench.storage.cells import find_cells
+from codesign_bench.storage.layout import CURVE_FILE, EVALUATION_FILE, METRICS_FILE, POLICY_FILE, open_folder
+from codesign_bench.storage.records import CELL_FILE, CellRecord
+from codesign_bench.studies.corl2023.members import OURS
 
 REFERENCE = Path(__file__).resolve().parent / "reference"
 """Where cells go unless told otherwise."""
@@ -33,9 +24,9 @@ RECORDS = (CURVE_FILE, METRICS_FILE, EVALUATION_FILE, CELL_FILE)
 """What is shipped of every cell; the file that says it is finished comes last."""
 
 
-def ships_policy(cell: Mapping[str, Any]) -> bool:
+def ships_policy(cell: CellRecord) -> bool:
     """Tell whether a cell's policy is shipped."""
-    return bool(cell["seed"] == 0 or (cell["method"] == OURS and cell["variant"] == DEFAULT_VARIANT))
+    return cell.seed == 0 or (cell.method == OURS and cell.variant == DEFAULT)
 
 
 def ship(runs: Path, shipped: Path, all_policies: bool = False) -> list[Path]:
@@ -45,16 +36,16 @@ def ship(runs: Path, shipped: Path, all_policies: bool = False) -> list[Path]:
         UserError: `runs` is no results folder, or `shipped` cannot be one.
     """
     copied = []
-    cells = [(folder, cell) for folder, cell in find_cells(runs) if cell["status"] == DONE]
+    cells = [cell for cell in find_cells(runs) if cell.is_done]
     open_folder(shipped)
-    for folder, cell in cells:
-        target = shipped / folder.relative_to(runs)
+    for cell in cells:
+        target = shipped / cell.folder.relative_to(runs)
         if (target / CELL_FILE).exists():
             continue
         target.mkdir(parents=True, exist_ok=True)
-        policy = (POLICY_FILE,) if all_policies or ships_policy(cell) else ()
+        policy = (POLICY_FILE,) if all_policies or ships_policy(cell.record) else ()
         for name in (*policy, *RECORDS):
-            shutil.copyfile(folder / name, target / name)
+            shutil.copyfile(cell.folder / name, target / name)
         copied.append(target)
     return copied
 

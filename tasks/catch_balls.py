@@ -15,6 +15,7 @@ from codesign_bench.task import (
     Behaviour,
     Booleans,
     Box,
+    ByProfile,
     Floats,
     Given,
     Quantity,
@@ -212,6 +213,10 @@ class CatchBalls(Task):
     success_steps = HOLD_STEPS
     failure_condition = "a ball has fallen below the tool, and every other one has, too, or is caught"
 
+    run_settings: ClassVar[ByProfile] = {
+        "quick": {"steps": 400_000, "tradeoff_scale": 0.01},
+        "laptop": {"tradeoff_scale": 0.01},
+    }
     outcome = Quantity("balls held", "balls")
     soundness = Soundness(
         overlap=LINK_HALF_WIDTH,

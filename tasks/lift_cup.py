@@ -14,6 +14,7 @@ from codesign_bench.task import (
     OURS,
     Behaviour,
     Box,
+    ByProfile,
     Floats,
     Given,
     Quantity,
@@ -280,6 +281,10 @@ class LiftCup(Task):
         f"the cup is tipped by more than {np.rad2deg(np.arccos(TIPPED)):.0f} degrees, or has fallen off the table"
     )
 
+    run_settings: ClassVar[ByProfile] = {
+        "quick": {"steps": 400_000},
+        "laptop": {"steps": 700_000},
+    }
     outcome = Quantity("height of the cup's lowest corner while upright", "m")
     max_slots = MAX_SLOTS
     soundness = Soundness(overlap=WALL, speed=4.0, outcome_change=0.01)

@@ -19,6 +19,7 @@ from codesign_bench.task import (
     Behaviour,
     Booleans,
     Box,
+    ByProfile,
     Floats,
     Given,
     Physics,
@@ -264,6 +265,10 @@ class Scoop(Task):
     }
     success_steps = HELD_STEPS
 
+    run_settings: ClassVar[ByProfile] = {
+        "quick": {"steps": 260_000},
+        "laptop": {"steps": 600_000},
+    }
     outcome = Quantity("balls held out of the reservoir", "balls")
     soundness = Soundness(overlap=MAX_BALL_SPEED * CLOCK.period, speed=MAX_BALL_SPEED, outcome_change=0.3, chaotic=True)
 

@@ -16,6 +16,7 @@ from codesign_bench.task import (
     Behaviour,
     Booleans,
     Box,
+    ByProfile,
     Floats,
     Given,
     Physics,
@@ -307,6 +308,7 @@ class Scoop3D(Task):
     success_steps = HELD_STEPS
     failure_condition = f"the tool has been clear for {LOST_STEPS} control steps in all without success"
 
+    run_settings: ClassVar[ByProfile] = {"laptop": {"steps": 500_000, "evaluations": 10}}
     outcome = Quantity("balls held above the line", "balls")
     max_slots = MAX_SLOTS
     # Balls that meet at up to 2.8 m/s overlap for a step of 1/120 s, also right after they were poured; tools start

@@ -79,7 +79,7 @@ def test_status_tells_why_a_cell_failed(tmp_path: Path, capsys: pytest.CaptureFi
         (["run", "--task", "toy_reach"], "--method"),
         ([*RUN, "--profile", "fast"], "quick, laptop, paper"),
         ([*RUN, "speed=1"], "episodes"),
-        ([*RUN, "episodes=few"], "whole number"),
+        ([*RUN, "episodes=few"], "expected an integer"),
         ([*RUN, "threads=4096"], "cores"),
         ([*RUN, "--seeds", "0"], "--seeds"),
         ([*RUN, "--seeds", "-1"], "--seeds"),
@@ -142,7 +142,7 @@ def test_a_truncated_checkpoint_is_named(tmp_path: Path, capsys: pytest.CaptureF
 def test_another_configuration_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*RUN, "--out", str(tmp_path)]) == 0
     assert main([*RUN, "episodes=9", "--out", str(tmp_path)]) == 2
-    assert "episodes: there 4, asked 9" in capsys.readouterr().err
+    assert "episodes: stored 4, requested 9" in capsys.readouterr().err
 
 
 def test_python_dash_m_is_the_same_program() -> None:

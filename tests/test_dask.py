@@ -15,10 +15,11 @@ import pytest
 from rich.console import Console
 
 from codesign_bench import load_results
-from codesign_bench.cell.cell import Cell, grid
+from codesign_bench.cell.cell import Cell, resolve_cells
+from codesign_bench.cell.grid import grid
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
-from codesign_bench.storage.results import PROGRESS_FILE
+from codesign_bench.storage.layout import PROGRESS_FILE
 from codesign_bench.sweep.runner import run_sweep
 
 distributed: Any = pytest.importorskip("distributed")
@@ -42,7 +43,7 @@ def cells(delay: float = 0.0, fail: bool = False) -> list[Cell]:
 def sweep(wanted: list[Cell], out: Path, **options: Any) -> tuple[int, str]:
     """Run a sweep; return its exit code and what it printed."""
     console = Console(record=True, width=200, file=io.StringIO())
-    code = run_sweep(wanted, out, console=console, **options)
+    code = run_sweep(resolve_cells(wanted), out, console=console, **options)
     return code, console.export_text()
 
 

@@ -27,7 +27,6 @@ from codesign_bench.task import Behaviour, Floats, Singles, deployment_of
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.robot import IDEAL, PANDA
 
-REFERENCE = Path(__file__).resolve().parent.parent / "results" / "reference"
 TASKS = ("fetch_cube", "lift_cup")
 NEAR_START = np.array([-0.211, 0.633])
 """Of tool 4, in the task's frame: the script fetches it."""
@@ -183,28 +182,8 @@ def test_a_cube_that_ends_within_5_cm_is_nearly_fetched() -> None:
     assert (summary["trials"], summary["successes"], summary["near"]) == (3, 1, 1)
 
 
-@pytest.mark.skipif(not REFERENCE.exists(), reason="a source distribution leaves the results out")
-def test_the_shipped_deployment_is_the_papers_whole_protocol() -> None:
-    frame = load_deployment(REFERENCE)
-    trials = frame.groupby(["task", "kind", "tool"]).size().unstack("tool")
-    assert trials.loc[("fetch_cube", "own")].tolist() == [5, 5, 5, 5]
-    assert trials.loc[("fetch_cube", "grid")].tolist() == [12, 12, 12, 12]
-    assert trials.loc[("lift_cup", "own")].tolist() == [5, 5, 5, 5]
-
-
-@pytest.mark.skipif(not REFERENCE.exists(), reason="a source distribution leaves the results out")
-@pytest.mark.parametrize(("name", "tool"), [("fetch_cube", 2), ("lift_cup", 4)])
-def test_a_shipped_policy_succeeds_on_the_panda_as_its_table_says(name: str, tool: int, tmp_path: Path) -> None:
-    policy, task = policy_and_task(REFERENCE / name / "gnn_ppo" / "default" / "seed-00", name)
-    (again,) = deploy(task, policy, Order(TRIAL, tools=(tool,), gifs=False), tmp_path, lambda line: None)
-    frame = load_deployment(REFERENCE)
-    told = frame[(frame["task"] == name) & (frame["kind"] == "own") & (frame["tool"] == tool) & (frame["trial"] == 1)]
-    assert again["success"] == told["success"].item() == 1
-    assert again["steps"] == pytest.approx(told["steps"].item(), abs=5), "another processor rounds otherwise"
-
-
 def test_a_policy_of_another_task_is_refused() -> None:
-    with pytest.raises(UserError, match="is no cell's folder"):
+    with pytest.raises(UserError, match="is not a cell folder"):
         policy_and_task(Path("nowhere"), "fetch_cube")
 
 
@@ -217,7 +196,7 @@ def test_the_command_refuses_what_does_not_go_together(capsys: pytest.CaptureFix
     assert main(["deploy", "--policy", "cell", "--protocol", "--trials", "2"]) == 2
     assert "--protocol sets tools and trials itself" in capsys.readouterr().err
     assert main(["deploy", "--policy", "nowhere"]) == 2
-    assert "'nowhere' is no cell's folder" in capsys.readouterr().err
+    assert "'nowhere' is not a cell folder" in capsys.readouterr().err
 
 
 def test_a_trial_takes_no_more_steps_than_the_task_says(monkeypatch: pytest.MonkeyPatch) -> None:

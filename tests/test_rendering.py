@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import VERSION_0_1_0
 from PIL import Image
 
 from codesign_bench.cli import main
@@ -14,7 +15,7 @@ from codesign_bench.evaluation.rendering import CAPTION_PIXELS, FRAMES_PER_SECON
 from codesign_bench.task import load_task
 from codesign_bench.task.behaviours import RandomBehaviour
 
-TRAINED = Path(__file__).resolve().parent.parent / "results" / "reference" / "push" / "gnn_ppo" / "default" / "seed-00"
+TRAINED = VERSION_0_1_0 / "push" / "gnn_ppo" / "default" / "seed-00"
 
 
 def frame_size(task_name: str) -> tuple[int, int]:
@@ -61,7 +62,6 @@ def test_random_behaviour_follows_its_seed(tmp_path: Path) -> None:
     assert first.read_bytes() == again.read_bytes() != other.read_bytes()
 
 
-@pytest.mark.skipif(not TRAINED.exists(), reason="a source distribution leaves the results out")
 def test_a_trained_policy_knows_its_task(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "trained.png"
     assert main(["render", "--policy", str(TRAINED), "--out", str(path)]) == 0
@@ -78,7 +78,7 @@ def test_a_trained_policy_knows_its_task(tmp_path: Path, capsys: pytest.CaptureF
         (["--out", "push.png"], "give --task, or --policy"),
         (["--policy", "x", "--behaviour", "random", "--out", "push.png"], "either --policy or --behaviour"),
         (["--task", "push", "--episodes", "0", "--out", "push.png"], "--episodes must be at least 1"),
-        (["--policy", "nowhere", "--out", "push.png"], "is no cell's folder"),
+        (["--policy", "nowhere", "--out", "push.png"], "is not a cell folder"),
         (["--task", "push", "--out", "/proc/push.png"], "cannot write there"),
     ],
 )

@@ -14,7 +14,8 @@ import pandas as pd
 import pytest
 
 from codesign_bench import load_results
-from codesign_bench.storage.results import CHECKPOINT_FILE, is_locked, read_cell
+from codesign_bench.storage.layout import CHECKPOINT_FILE, is_locked
+from codesign_bench.storage.records import CellRecord
 
 pytestmark = pytest.mark.usefixtures("toy", "every_batch")
 
@@ -121,9 +122,9 @@ def test_wall_time_goes_on_from_the_interruption(tmp_path: Path) -> None:
     assert finish(start(*ARGUMENTS, *SLOW, "--out", tmp_path))[0] == 0
     frame = load_results(tmp_path)
     assert frame["wall_s"].is_monotonic_increasing
-    content = read_cell(tmp_path / SEED_FOLDER)
-    assert content is not None
-    assert content["timings"]["wall_s"] >= content["timings"]["train_s"] > 1.0
+    record = CellRecord.read(tmp_path / SEED_FOLDER)
+    assert record is not None
+    assert float(record.timings.wall_s or 0.0) >= float(record.timings.train_s or 0.0) > 1.0
 
 
 def test_ctrl_c_says_how_to_go_on_and_leaves_no_process(tmp_path: Path) -> None:
@@ -143,9 +144,10 @@ def test_a_killed_worker_does_not_end_the_sweep(tmp_path: Path) -> None:
         pytest.skip("one core means no joblib workers")
     process = start(*ARGUMENTS, "delay=0.05", "--seeds", "2", "--out", tmp_path)
     wait_for(lambda: len(list(tmp_path.glob(f"*/*/*/*/{CHECKPOINT_FILE}"))) >= 1 or process.poll() is not None)
-    content = read_cell(next(tmp_path.glob(f"*/*/*/*/{CHECKPOINT_FILE}")).parent)
-    assert content is not None
-    os.kill(parent_of(content["pid"]), signal.SIGKILL)
+    record = CellRecord.read(next(tmp_path.glob(f"*/*/*/*/{CHECKPOINT_FILE}")).parent)
+    assert record is not None
+    assert record.pid is not None
+    os.kill(parent_of(record.pid), signal.SIGKILL)
     code, text = finish(process)
     assert code == 0, text
     assert "a worker process died" in text

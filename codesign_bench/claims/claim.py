@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import Finding
+from codesign_bench.console import Log
 
 
 @dataclass(frozen=True)
@@ -25,16 +27,20 @@ class Rule:
     """Commands that make the data; `{results}` stands for the results folder, `{profile}` for its option or nothing."""
     judge: Callable[[Evidence, np.random.Generator], Finding]
     """The rule itself; raises `Lacking` where data are missing."""
+    measure: Callable[[Path, Log], object] | None = None
+    """Makes what no cell holds by playing finished policies or scripts, if it is missing; it may take minutes."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One finding of the paper, with the rule that judges it."""
+    """One finding of a study, with the rule that judges it."""
 
     name: str
     """Unique, for tables and files."""
     sentence: str
-    """What the paper claims, in our words."""
+    """What is claimed, in our words."""
     source: str
-    """The paper's section, figure or table."""
+    """Section, figure or table of a publication, or "ours"."""
     rule: Rule
+    tasks: tuple[str, ...] = ()
+    """Tasks that it speaks of; where results hold nothing of one of them, the claim is not asked."""

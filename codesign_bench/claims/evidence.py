@@ -12,13 +12,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.claims.finding import Lacking
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.deployment.tables import load_deployment
 from codesign_bench.errors import UserError
-from codesign_bench.evaluation.sensitivity import load_or_measure
+from codesign_bench.evaluation.extrapolation import load_outside
+from codesign_bench.evaluation.sensitivity import load_sensitivity
 from codesign_bench.stats import CELL_KEYS, MIN_SEEDS
-from codesign_bench.storage.results import DEFAULT_VARIANT, find_cells, load_evaluations, load_results
+from codesign_bench.storage.cells import find_cells
+from codesign_bench.storage.frames import load_evaluations, load_results
 from codesign_bench.task import load_task, task_names
 
 DESIGN_PREFIX = "design_"
@@ -31,7 +34,7 @@ class Evidence:
     curves: pd.DataFrame = field(default_factory=pd.DataFrame)
     """As `codesign_bench.load_results` gives them."""
     evaluations: pd.DataFrame = field(default_factory=pd.DataFrame)
-    """As `codesign_bench.storage.results.load_evaluations` gives them."""
+    """As `codesign_bench.storage.frames.load_evaluations` gives them."""
     sensitivity: pd.DataFrame = field(default_factory=pd.DataFrame)
     """As `codesign_bench.evaluation.sensitivity.measure` gives it, several tasks below each other."""
     outside: pd.DataFrame = field(default_factory=pd.DataFrame)
@@ -43,7 +46,13 @@ class Evidence:
     profile: str = DEFAULT_PROFILE
     """The profile that the cells were run with, if it is the same for all, so that what is missing can match them."""
 
-    def instances(self, task: str, method: str, variant: str = DEFAULT_VARIANT) -> pd.DataFrame:
+    @property
+    def tasks(self) -> set[str]:
+        """Names of the tasks of which anything is known."""
+        frames = (self.curves, self.evaluations, self.sensitivity, self.outside, self.deployment)
+        return {str(task) for frame in frames if len(frame) for task in frame["task"].unique()}
+
+    def instances(self, task: str, method: str, variant: Variant = DEFAULT) -> pd.DataFrame:
         """Return the final evaluation of the finished cells of one method, task and variant, one row per instance.
 
         Raises:
@@ -52,11 +61,11 @@ class Evidence:
         rows = _select(self.evaluations, task, method, variant)
         seeds = rows["seed"].nunique() if len(rows) else 0
         if seeds < MIN_SEEDS:
-            told = f"{seeds} finished seed{'' if seeds == 1 else 's'}"
-            raise Lacking(f"{told} of {task}/{method}/{variant}; {MIN_SEEDS} are needed")
+            counted = f"{seeds} finished seed{'' if seeds == 1 else 's'}"
+            raise Lacking(f"{counted} of {task}/{method}/{variant.name}; {MIN_SEEDS} are needed")
         return rows
 
-    def final_returns(self, task: str, method: str, variant: str = DEFAULT_VARIANT) -> np.ndarray:
+    def final_returns(self, task: str, method: str, variant: Variant = DEFAULT) -> np.ndarray:
         """Return the mean return over evaluation instances at the end of training, (N,).
 
         Raises:
@@ -64,7 +73,7 @@ class Evidence:
         """
         return self.instances(task, method, variant).groupby("seed")["return"].mean().to_numpy()
 
-    def curve(self, task: str, method: str, variant: str = DEFAULT_VARIANT) -> pd.DataFrame:
+    def curve(self, task: str, method: str, variant: Variant = DEFAULT) -> pd.DataFrame:
         """Return the learning curves of the finished cells of one method, task and variant.
 
         Raises:
@@ -73,10 +82,10 @@ class Evidence:
         finished = self.instances(task, method, variant)["seed"].unique()
         rows = _select(self.curves, task, method, variant)
         if not len(rows) or not set(finished) <= set(rows["seed"]):
-            raise Lacking(f"a finished cell of {task}/{method}/{variant} has no curve")
+            raise Lacking(f"a finished cell of {task}/{method}/{variant.name} has no curve")
         return rows[rows["seed"].isin(finished)]
 
-    def budget(self, task: str, method: str, variant: str = DEFAULT_VARIANT) -> float:
+    def budget(self, task: str, method: str, variant: Variant = DEFAULT) -> float:
         """Return the mean environment steps at the end of training over finished seeds.
 
         Raises:
@@ -85,54 +94,27 @@ class Evidence:
         return float(self.curve(task, method, variant).groupby("seed")["env_steps"].max().mean())
 
 
-def _select(frame: pd.DataFrame, task: str, method: str, variant: str) -> pd.DataFrame:
+def _select(frame: pd.DataFrame, task: str, method: str, variant: Variant) -> pd.DataFrame:
     """Return the rows of one method, task and variant."""
     if frame.empty:
         return frame
     wanted = pd.Series(True, index=frame.index)
-    for column, value in zip(CELL_KEYS, (task, method, variant), strict=True):
+    for column, value in zip(CELL_KEYS, (task, method, variant.name), strict=True):
         wanted &= frame[column] == value
     return frame[wanted]
 
 
-@dataclass(frozen=True)
-class Measure:
-    """What is not in the cells: read from tables beside them, or measured where it is missing."""
-
-    missing: bool = False
-    """Whether to measure what is missing; it takes minutes."""
-    outside: Sequence[tuple[str, str]] = ()
-    """Tasks and methods whose policies are played outside the training region."""
-    say: Callable[[str], None] = lambda line: None
-    """Tells the user a line."""
-
-    def sensitivity(self, results: Path) -> pd.DataFrame:
-        """Return the design-sensitivity tables."""
-        return load_or_measure(results, self.say, self.missing)
-
-    def outside_region(self, results: Path) -> pd.DataFrame:
-        """Return what policies reach outside the region."""
-        from codesign_bench.evaluation.extrapolation import load_or_measure as load_or_play
-
-        return load_or_play(results, self.outside, self.say, self.missing)
-
-
-def load_evidence(results: Path, measure: Measure | None = None) -> Evidence:
+def load_evidence(results: Path) -> Evidence:
     """Read everything that claims are judged on from a results folder.
-
-    Args:
-        results: the folder.
-        measure: what to measure beforehand with finished policies and scripts, where it is missing; None: nothing.
 
     Raises:
         UserError: there is no such folder, or it holds neither a finished cell nor a design-sensitivity table.
     """
-    profiles = {str(content.get("profile", DEFAULT_PROFILE)) for _, content in find_cells(results)}
+    profiles = {cell.record.profile for cell in find_cells(results)}
     curves = _read(load_results, results, ("return_mean", "success_rate"))
     evaluations = _read(load_evaluations, results, ("return", "success", "material", "effort"))
-    what = measure or Measure()
-    sensitivity = _read(what.sensitivity, results, ("tool", "goal", "success"))
-    outside = _read(what.outside_region, results, ("task", "method", "seed", "instance", "success"))
+    sensitivity = _read(load_sensitivity, results, ("tool", "goal", "success"))
+    outside = _read(load_outside, results, ("task", "method", "seed", "instance", "success"))
     deployment = _read(load_deployment, results, ("task", "kind", "tool", "row", "column", "success"))
     if evaluations.empty and sensitivity.empty:
         raise UserError(f"no finished cell in '{results}' yet; make some with: codesign-bench run --out {results}")

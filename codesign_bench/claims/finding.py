@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 SUPPORTED, CONTRADICTED, UNDECIDED = "supported", "contradicted", "undecided"
 VERDICTS = (SUPPORTED, CONTRADICTED, UNDECIDED)
+NOT_ASKED = "not asked"
+"""In place of a verdict: the results hold nothing of a task that the claim speaks of."""
 
 
 class Lacking(Exception):
@@ -18,7 +20,7 @@ class Finding:
     """A claim's statistic and what follows from it."""
 
     verdict: str
-    """One of `VERDICTS`."""
+    """One of `VERDICTS`, or `NOT_ASKED`."""
     value: float
     """The statistic over all seeds; NaN where there is none."""
     low: float = math.nan

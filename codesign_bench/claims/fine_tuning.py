@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.integrate import trapezoid
 
+from codesign_bench.cell.variant import Variant
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import Finding, above, below
@@ -22,7 +23,7 @@ def fine_tuning_wins(task: str, method: str, number: int, needs: tuple[str, ...]
     """Return the rule for "going on with fine-tuning instance `number` beats learning it from scratch"."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
-        variants = (f"finetune-{number}", f"scratch-{number}")
+        variants = (Variant.of(finetune=number), Variant.of(scratch=number))
         check_budgets(evidence, task, *((method, variant) for variant in variants))
         first, second = (mean_along_curve(evidence.curve(task, method, variant)) for variant in variants)
         value, low, high = estimate([first, second], difference, rng)
@@ -50,7 +51,7 @@ def unsolved_before(task: str, method: str, number: int, needs: tuple[str, ...])
     """Return the rule for "the policy that is fine-tuned does not solve fine-tuning instance `number` beforehand"."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
-        curves = evidence.curve(task, method, f"finetune-{number}").sort_values("env_steps")
+        curves = evidence.curve(task, method, Variant.of(finetune=number)).sort_values("env_steps")
         rates = curves.groupby("seed")["success_rate"].first().to_numpy()
         value, low, high = estimate([rates], mean, rng)
         return Finding(below(low, high, SOLVED), value, low, high, seeds_of(rates))
@@ -68,7 +69,7 @@ def solved_after(task: str, method: str, number: int, needs: tuple[str, ...]) ->
     """Return the rule for "after fine-tuning, the policy solves fine-tuning instance `number`"."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
-        rows = evidence.instances(task, method, f"finetune-{number}")
+        rows = evidence.instances(task, method, Variant.of(finetune=number))
         rates = rows.groupby("seed")["success"].mean().to_numpy()
         value, low, high = estimate([rates], mean, rng)
         return Finding(above(low, high, SOLVED), value, low, high, seeds_of(rates))

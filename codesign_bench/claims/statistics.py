@@ -11,9 +11,9 @@ import numpy as np
 from scipy.stats import rankdata
 
 from codesign_bench import stats
+from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import Lacking
-from codesign_bench.storage.results import DEFAULT_VARIANT
 
 OVER_SEEDS = "the 95 % bootstrap interval over seeds"
 BUDGET_TOLERANCE = 0.1
@@ -84,7 +84,7 @@ def at_each(levels: Sequence[float], read: Callable[[float], np.ndarray]) -> dic
     return found
 
 
-def check_budgets(evidence: Evidence, task: str, *sides: tuple[str, str]) -> None:
+def check_budgets(evidence: Evidence, task: str, *sides: tuple[str, Variant]) -> None:
     """Check that all sides, each (method, variant), were trained for the same number of environment steps.
 
     Raises:
@@ -102,7 +102,7 @@ def check_methods(evidence: Evidence, task: str, *methods: str) -> None:
     Raises:
         Lacking: as `check_budgets` does.
     """
-    check_budgets(evidence, task, *((method, DEFAULT_VARIANT) for method in methods))
+    check_budgets(evidence, task, *((method, DEFAULT) for method in methods))
 
 
 def seeds_of(*samples: np.ndarray) -> str:

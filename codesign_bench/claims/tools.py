@@ -14,6 +14,7 @@ from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, Lacking, above
 from codesign_bench.claims.statistics import OVER_SEEDS, estimate, mean, run_command, seeds_of
+from codesign_bench.evaluation.sensitivity import measure_missing
 
 GOAL_SHARE = 0.1
 """Share of the variance of tools that goals must make for tools to vary with the goal (ours)."""
@@ -80,4 +81,5 @@ def no_single_tool(task: str) -> Rule:
         words=f"supported if it is below 1, contradicted if it is 1, over at least {FEWEST_TOOLS} tools; no interval",
         needs=("codesign-bench plot design_sensitivity --results {results}",),
         judge=judge,
+        measure=lambda results, log: measure_missing(results, [task], log),
     )

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from codesign_bench.cell.variant import Variant
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import Finding, Lacking, above, below
@@ -76,9 +77,10 @@ def smallest_drop(*samples: np.ndarray) -> np.ndarray:
 
 def _quantity(evidence: Evidence, task: str, method: str, alpha: float, quantity: str) -> np.ndarray:
     """Return (N,): each seed's material, effort or their ratio."""
-    means = evidence.instances(task, method, f"alpha-{alpha:.2f}").groupby("seed")[[MATERIAL, EFFORT]].mean()
+    variant = Variant.of(alpha=alpha)
+    means = evidence.instances(task, method, variant).groupby("seed")[[MATERIAL, EFFORT]].mean()
     if quantity != RATIO:
         return means[quantity].to_numpy()
     if (means[EFFORT] <= 0.0).any():
-        raise Lacking(f"a seed of {task}/{method}/alpha-{alpha:.2f} never moves: its ratio is infinite")
+        raise Lacking(f"a seed of {task}/{method}/{variant.name} never moves: its ratio is infinite")
     return (means[MATERIAL] / means[EFFORT]).to_numpy()

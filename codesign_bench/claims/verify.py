@@ -13,14 +13,14 @@ from rich.console import Console
 
 from codesign_bench import __version__, stats
 from codesign_bench.claims.claim import Claim
-from codesign_bench.claims.evidence import Evidence, Measure, load_evidence
-from codesign_bench.claims.finding import CONTRADICTED, UNDECIDED, VERDICTS, Finding, Lacking
+from codesign_bench.claims.evidence import Evidence, load_evidence
+from codesign_bench.claims.finding import CONTRADICTED, NOT_ASKED, UNDECIDED, VERDICTS, Finding, Lacking
 from codesign_bench.config.profiles import DEFAULT_PROFILE
-from codesign_bench.console import print_table
+from codesign_bench.console import Log, print_table, printer
 from codesign_bench.errors import UserError
 from codesign_bench.seeding import generator
 from codesign_bench.storage.files import write_bytes, write_json
-from codesign_bench.studies.corl2023.claims import CLAIMS, OUTSIDE
+from codesign_bench.study.study import Study
 from codesign_bench.text_tables import markdown
 
 MARKDOWN_FILE, JSON_FILE = "claims.md", "claims.json"
@@ -36,6 +36,11 @@ class Row:
     finding: Finding
     needs: tuple[str, ...] = ()
     """Commands that make the missing data; empty where none are missing."""
+
+    @property
+    def asked(self) -> bool:
+        """Whether the results hold something of every task that the claim speaks of."""
+        return self.finding.verdict != NOT_ASKED
 
     @property
     def interval(self) -> str:
@@ -54,57 +59,74 @@ def judge(claims: Sequence[Claim], evidence: Evidence, results: str) -> list[Row
 
 
 def _row(claim: Claim, evidence: Evidence, results: str) -> Row:
+    profile = "" if evidence.profile == DEFAULT_PROFILE else f" --profile {evidence.profile}"
+    needs = tuple(command.format(results=results, profile=profile) for command in claim.rule.needs)
+    absent = [task for task in claim.tasks if task not in evidence.tasks]
+    if absent:
+        return Row(claim, Finding(NOT_ASKED, math.nan, note=f"no results of {', '.join(absent)}"), needs)
     try:
         return Row(claim, claim.rule.judge(evidence, generator(SEED, f"claim {claim.name}")))
     except Lacking as lacking:
-        profile = "" if evidence.profile == DEFAULT_PROFILE else f" --profile {evidence.profile}"
-        needs = tuple(command.format(results=results, profile=profile) for command in claim.rule.needs)
         return Row(claim, Finding(UNDECIDED, math.nan, note=str(lacking)), needs)
 
 
-def verify(results: Path, out: Path, console: Console, *, measure: bool = False) -> None:
-    """Judge the paper's claims on the results folder, print the table and write it into `out`.
+def verify(study: Study, results: Path, out: Path, console: Console, *, measure: bool = False) -> None:
+    """Judge the claims of a study on the results folder, print the table and write it into `out`.
 
     With `measure`, tools and policies are first played where claims need outcomes that no cell holds; it takes minutes.
 
     Raises:
         UserError: there are no results, they cannot be read, or `out` cannot be written.
     """
-
-    def say(line: str) -> None:
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
-
-    evidence = load_evidence(results, Measure(measure, OUTSIDE, say))
-    rows = judge(CLAIMS, evidence, str(results))
-    paths = write_rows(rows, results, out)
+    claims, log = study.claims(), printer(console)
+    evidence = load_evidence(results)
+    if measure:
+        _measure(claims, evidence, results, log)
+        evidence = load_evidence(results)
+    rows = judge(claims, evidence, str(results))
+    paths = write_rows(rows, study, results, out)
     print_rows(rows, console)
     for path in paths:
-        console.print(str(path), markup=False, highlight=False, soft_wrap=True)
+        log(str(path))
+
+
+def _measure(claims: Sequence[Claim], evidence: Evidence, results: Path, log: Log) -> None:
+    """Make what no cell holds for every claim that is asked; say what cannot be made."""
+    for claim in claims:
+        if claim.rule.measure is not None and set(claim.tasks) <= evidence.tasks:
+            try:
+                claim.rule.measure(results, log)
+            except UserError as error:
+                log(f"{claim.name} left out: {error}")
 
 
 def print_rows(rows: Sequence[Row], console: Console) -> None:
-    """Print one line per claim, those without data last, then the counts and what would make the missing data."""
-    ordered = sorted(rows, key=lambda row: bool(row.needs))
+    """Print one line per claim that is asked, those without data last, then counts and what would make missing data."""
+    log = printer(console)
+    ordered = sorted((row for row in rows if row.asked), key=lambda row: bool(row.needs))
     table = [(row.finding.verdict, row.claim.name, row.interval, row.finding.n, row.finding.note) for row in ordered]
     print_table(console, ("verdict", "claim", "statistic [95 % interval]", "n", "note"), table)
     for line in (summary(rows), *(f"needs: {command}" for command in missing(rows))):
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        log(line)
 
 
 def summary(rows: Sequence[Row]) -> str:
     """Return the counts of verdicts as a line."""
-    counts = Counter(row.finding.verdict for row in rows)
-    lacking = sum(bool(row.needs) for row in rows)
-    told = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS)
-    return f"{len(rows)} claims: {told} ({lacking} of them for lack of data)"
+    asked = [row for row in rows if row.asked]
+    counts = Counter(row.finding.verdict for row in asked)
+    lacking = sum(bool(row.needs) for row in asked)
+    verdicts = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS)
+    tasks = dict.fromkeys(task for row in rows if not row.asked for task in row.claim.tasks)
+    others = f"; {len(rows) - len(asked)} more not asked, without results of all of {', '.join(tasks)}" if tasks else ""
+    return f"{len(asked)} claims: {verdicts} ({lacking} of them for lack of data){others}"
 
 
 def missing(rows: Sequence[Row]) -> list[str]:
-    """Return the commands that make all missing data, each once."""
-    return list(dict.fromkeys(command for row in rows for command in row.needs))
+    """Return the commands that make all missing data of the claims that are asked, each once."""
+    return list(dict.fromkeys(command for row in rows if row.asked for command in row.needs))
 
 
-def write_rows(rows: Sequence[Row], results: Path, out: Path) -> list[Path]:
+def write_rows(rows: Sequence[Row], study: Study, results: Path, out: Path) -> list[Path]:
     """Write the rows as Markdown and JSON into `out` and return the paths.
 
     Raises:
@@ -113,17 +135,18 @@ def write_rows(rows: Sequence[Row], results: Path, out: Path) -> list[Path]:
     paths = [out / JSON_FILE, out / MARKDOWN_FILE]
     try:
         out.mkdir(parents=True, exist_ok=True)
-        write_json(paths[0], as_json(rows, results))
-        write_bytes(paths[1], as_markdown(rows, results).encode())
+        write_json(paths[0], as_json(rows, study, results))
+        write_bytes(paths[1], as_markdown(rows, study, results).encode())
     except OSError as error:
         raise UserError(f"--out {out}: cannot write there ({error.strerror})") from error
     return paths
 
 
-def as_json(rows: Sequence[Row], results: Path) -> dict[str, Any]:
+def as_json(rows: Sequence[Row], study: Study, results: Path) -> dict[str, Any]:
     """Return everything that is known of each claim, as JSON values; what is not finite is None or text."""
     return {
         "version": __version__,
+        "study": study.name,
         "results": str(results),
         "interval": {"kind": "percentile bootstrap", "confidence": stats.CONFIDENCE, "resamples": stats.RESAMPLES},
         "claims": [
@@ -131,6 +154,7 @@ def as_json(rows: Sequence[Row], results: Path) -> dict[str, Any]:
                 "name": row.claim.name,
                 "sentence": row.claim.sentence,
                 "source": row.claim.source,
+                "tasks": list(row.claim.tasks),
                 "rule": row.claim.rule.kind,
                 "statistic": row.claim.rule.statistic,
                 "words": row.claim.rule.words,
@@ -147,8 +171,9 @@ def as_json(rows: Sequence[Row], results: Path) -> dict[str, Any]:
     }
 
 
-def as_markdown(rows: Sequence[Row], results: Path) -> str:
+def as_markdown(rows: Sequence[Row], study: Study, results: Path) -> str:
     """Return the page: the table of claims, the rules that judged them, and the commands for missing data."""
+    asked = [row for row in rows if row.asked]
     header = ("claim", "verdict", "statistic [95 % interval]", "n", "rule", "source", "note")
     table = [
         (
@@ -160,14 +185,14 @@ def as_markdown(rows: Sequence[Row], results: Path) -> str:
             row.claim.source,
             "; ".join([row.finding.note, *(f"needs: `{command}`" for command in row.needs)]),
         )
-        for row in rows
+        for row in asked
     ]
-    rules = {row.claim.rule.kind: (row.claim.rule.statistic, row.claim.rule.words) for row in rows}
+    rules = {row.claim.rule.kind: (row.claim.rule.statistic, row.claim.rule.words) for row in asked}
     parts = [
-        "# What the results say of the paper's claims\n",
+        f"# {study.title}: what the results say of its claims\n",
         f"Results: `{results}`. {summary(rows)}. Intervals are 95 % percentile bootstrap intervals over seeds "
         f"({stats.RESAMPLES:,} resamples); below {stats.MIN_SEEDS} seeds there is none and nothing is decided.\n",
-        by_rule(rows),
+        by_rule(asked),
         "## Contradicted\n",
         contradicted(rows),
         "## Every claim\n",

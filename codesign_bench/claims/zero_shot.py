@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from codesign_bench.cell.variant import Variant
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import Finding, Lacking, above, below
@@ -23,7 +24,7 @@ from codesign_bench.claims.statistics import (
     seeds_of,
     trend,
 )
-from codesign_bench.evaluation.extrapolation import RIM
+from codesign_bench.evaluation.extrapolation import RIM, load_or_measure
 from codesign_bench.stats import MIN_SEEDS
 
 CLOSE = 0.9
@@ -125,6 +126,7 @@ def outside_solved(task: str, method: str, needs: str) -> Rule:
         words=f"supported if {OVER_SEEDS} lies above {OUTSIDE_SOLVED:g}, contradicted if below {OUTSIDE_SOLVED:g}",
         needs=(needs, "codesign-bench verify --measure --results {results}"),
         judge=judge,
+        measure=lambda results, log: load_or_measure(results, [(task, method)], log, measure_missing=True),
     )
 
 
@@ -141,9 +143,10 @@ def largest_loss(*samples: np.ndarray) -> np.ndarray:
 
 def _cutout_rows(evidence: Evidence, task: str, method: str, fraction: float) -> pd.DataFrame:
     """Return the evaluation of cells trained without a fraction of the region."""
-    rows = evidence.instances(task, method, f"cutout-{fraction:.2f}")
+    variant = Variant.of(cutout=fraction)
+    rows = evidence.instances(task, method, variant)
     if "in_cutout" not in rows.columns or rows["in_cutout"].isna().any() or rows["in_cutout"].nunique() < 2:
-        raise Lacking(f"no instances both in and outside the cutout of {task}/{method}/cutout-{fraction:.2f}")
+        raise Lacking(f"no instances both in and outside the cutout of {task}/{method}/{variant.name}")
     return rows
 
 

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.config.values import parse_int
 from codesign_bench.errors import UserError, unknown_name
-from codesign_bench.registry import names
+from codesign_bench.registry import KINDS, names
+from codesign_bench.study import DEFAULT_STUDY, load_study
 
 DEFAULT_RESULTS = Path("results/runs")
 DEFAULT_FIGURES = Path("results/figures")
 DEFAULT_CLAIMS = Path("results/claims")
 DEFAULT_REPORT = Path("results/report.html")
-ALL = "all"
+ALL, BEYOND = "all", "beyond"
 
 
 def add_results(parser: argparse.ArgumentParser) -> None:
@@ -33,6 +34,11 @@ def add_out(parser: argparse.ArgumentParser, default: Path, metavar: str = "DIR"
 def add_profile(parser: argparse.ArgumentParser) -> None:
     """Add `--profile`."""
     parser.add_argument("--profile", default=DEFAULT_PROFILE, metavar="P", help=f"default: {DEFAULT_PROFILE}")
+
+
+def add_study(parser: argparse.ArgumentParser) -> None:
+    """Add `--study`, whose experiments, figures and claims a command works with."""
+    parser.add_argument("--study", default=DEFAULT_STUDY, metavar="NAME", help=f"default: {DEFAULT_STUDY}, the paper's")
 
 
 def add_jobs(parser: argparse.ArgumentParser) -> None:
@@ -86,18 +92,43 @@ def check_at_least_one(options: argparse.Namespace, *options_names: str) -> None
             raise UserError(f"--{name.replace('_', '-')} must be at least 1, not {value}")
 
 
-def chosen_names(group: str, given: Sequence[str], everything: Sequence[str]) -> list[str]:
-    """Return the names that an argument means, in the order given: separate words or commas, `all` for `everything`.
+def chosen_names(group: str, given: Sequence[str], meanings: Mapping[str, Sequence[str]]) -> list[str]:
+    """Return the names that an argument means, in the order given: separate words or commas.
+
+    Args:
+        group: one of `registry.KINDS`.
+        given: words of the command line.
+        meanings: words that stand for several names, e.g. `all`.
 
     Raises:
         UserError: an unknown name, or none at all.
     """
     words = [word for text in given for word in text.split(",") if word]
-    chosen = list(dict.fromkeys(name for word in words for name in (everything if word == ALL else (word,))))
-    known = names(group)
+    chosen = list(dict.fromkeys(name for word in words for name in meanings.get(word, (word,))))
+    known, kind = names(group), KINDS[group]
     for name in chosen:
         if name not in known:
-            raise unknown_name(group.rstrip("s"), name, (*known, ALL))
+            raise unknown_name(kind, name, (*known, *meanings))
     if not chosen:
-        raise UserError(f"--{group.rstrip('s')}: no name given; choose from: {', '.join((*known, ALL))}")
+        raise UserError(f"--{kind}: no name given; choose from: {', '.join((*known, *meanings))}")
     return chosen
+
+
+def chosen_tasks(given: Sequence[str]) -> list[str]:
+    """Return the tasks that `--task` means.
+
+    Raises:
+        UserError: an unknown name, or none at all.
+    """
+    return chosen_names("tasks", given, {ALL: names("tasks")})
+
+
+def chosen_methods(given: Sequence[str]) -> list[str]:
+    """Return the methods that `--method` means: `all` is those of the default study, `beyond` all others.
+
+    Raises:
+        UserError: an unknown name, or none at all.
+    """
+    paper = load_study(DEFAULT_STUDY).methods
+    beyond = tuple(name for name in names("methods") if name not in paper)
+    return chosen_names("methods", given, {ALL: paper, BEYOND: beyond})

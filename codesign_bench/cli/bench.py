@@ -7,9 +7,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import ALL, check_at_least_one, chosen_names, integer
+from codesign_bench.cli.arguments import ALL, check_at_least_one, chosen_tasks, integer
 from codesign_bench.errors import unknown_name
-from codesign_bench.registry import names
 
 HELP = "measure speed on this machine"
 
@@ -37,7 +36,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.what == "tasks":
         from codesign_bench.benchmarks.tasks import bench_tasks
 
-        bench_tasks(chosen_names("tasks", options.task, names("tasks")), options.seconds, console)
+        bench_tasks(chosen_tasks(options.task), options.seconds, console)
         return 0
     from codesign_bench.benchmarks.learner import bench_learner, contestants
     from codesign_bench.benchmarks.workload import Workload

@@ -1,4 +1,4 @@
-"""`codesign-bench list`: names of methods, tasks, figures and profiles; imports none of them."""
+"""`codesign-bench list`: names of methods, tasks, figures, studies and profiles; imports neither methods nor tasks."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import argparse
 
 from rich.console import Console
 
-from codesign_bench.config.profiles import PROFILE_HELP
+from codesign_bench.config.profiles import profiles
 from codesign_bench.console import printer
 from codesign_bench.registry import names
+from codesign_bench.study import DEFAULT_STUDY, load_study, study_names
 
-HELP = "names of methods, tasks, figures and profiles"
+HELP = "names of methods, tasks, figures, studies and profiles"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,12 +21,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     """Print the names."""
     del options
-    log = printer(console)
-    for title, group in (("methods", "methods"), ("tasks", "tasks"), ("figures", "paper_figs")):
+    log, of_study = printer(console), load_study(DEFAULT_STUDY).methods
+    beyond = [name for name in names("methods") if name not in of_study]
+    for title, members in (("methods", of_study), ("methods beyond", beyond)):
+        for line in [title, *(f"  {name}" for name in members)] if members else []:
+            log(line)
+    for title, group in (("tasks", "tasks"), ("figures", "paper_figs")):
         log(title)
         for name in names(group):
             log(f"  {name}")
-    log("profiles")
-    for name, text in PROFILE_HELP.items():
-        log(f"  {name:8} {text}")
+    for title, entries in (
+        ("studies", [(name, load_study(name).title) for name in study_names()]),
+        ("profiles", [(profile.name, profile.help) for profile in profiles().values()]),
+    ):
+        log(title)
+        for name, text in entries:
+            log(f"  {name:8} {text}")
     return 0

@@ -6,14 +6,16 @@ import argparse
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import DEFAULT_REPORT, add_out, add_results
+from codesign_bench.cli.arguments import DEFAULT_REPORT, add_out, add_results, add_study
 from codesign_bench.console import printer
+from codesign_bench.study import load_study
 
 HELP = "write one page on everything that a results folder holds"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the folder and the file."""
+    add_study(parser)
     add_results(parser)
     add_out(parser, DEFAULT_REPORT, metavar="FILE")
 
@@ -22,5 +24,5 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Write the page and print its path."""
     from codesign_bench.report.page import write_report
 
-    write_report(options.results, options.out, printer(console))
+    write_report(options.results, options.out, printer(console), load_study(options.study))
     return 0

@@ -14,18 +14,22 @@ from codesign_bench.cli.arguments import (
     add_jobs,
     add_out,
     add_profile,
+    add_study,
     check_at_least_one,
     integer,
 )
+from codesign_bench.config.profiles import profile_named
+from codesign_bench.study import load_study
 
-HELP = "run what figures of the paper need, then draw them"
+HELP = "run what figures of a study need, then draw them"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the experiments, their size, and where results and figures go."""
     parser.add_argument("experiments", nargs="*", metavar="FIGURE", help="names, or all (default)")
+    add_study(parser)
     add_profile(parser)
-    parser.add_argument("--seeds", type=integer, metavar="N", help="seeds of every cell (default: the paper's)")
+    parser.add_argument("--seeds", type=integer, metavar="N", help="seeds of every cell (default: the study's)")
     add_jobs(parser)
     add_out(parser, DEFAULT_RESULTS)
     parser.add_argument(
@@ -35,13 +39,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Run, draw, verify and report; 1 if some cell failed."""
-    from codesign_bench.config.profiles import run_profile
     from codesign_bench.study.reproduce import reproduce
 
-    run_profile(options.profile, "push")  # refuses an unknown profile before anything runs
+    profile_named(options.profile)  # refuses an unknown profile before anything runs
     check_at_least_one(options, "seeds", "jobs")
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does.
     return reproduce(
+        load_study(options.study),
         options.experiments,
         profile=options.profile,
         results=options.out,

@@ -4,55 +4,49 @@ from __future__ import annotations
 
 import argparse
 import signal
+from collections.abc import Callable, Mapping
 
 from rich.console import Console
 
+from codesign_bench.cell.axes import BUILT_IN, parse_axis_value
+from codesign_bench.cell.variant import Value
 from codesign_bench.cli.arguments import (
     DEFAULT_RESULTS,
     add_config,
     add_jobs,
     add_out,
     check_at_least_one,
-    chosen_names,
+    chosen_methods,
+    chosen_tasks,
     integer,
 )
-from codesign_bench.config.profiles import DEVICES, PRECISIONS, check_fractions
+from codesign_bench.config.run_settings import DEVICES, PRECISIONS
 from codesign_bench.errors import UserError
-from codesign_bench.registry import names
 
 HELP = "train and evaluate: method x task x variant x seed"
+VALUE_TYPES: Mapping[type, Callable[[str], Value]] = {float: float, int: integer, str: str}
+"""How the values of an axis are read, by their type."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the grid, the configuration, and how to run it."""
-    parser.add_argument("--method", required=True, nargs="+", metavar="M", help="names, or all: the paper's five")
+    parser.add_argument(
+        "--method", required=True, nargs="+", metavar="M", help="names, all (the paper's five) or beyond (all others)"
+    )
     parser.add_argument("--task", required=True, nargs="+", metavar="T", help="names, or all")
     parser.add_argument("--seeds", default="1", help="a count (6 is 0-5), a list (0,3,5) or a range (2-4); default: 1")
     add_config(parser)
+    for axis in BUILT_IN.values():
+        parser.add_argument(
+            f"--{axis.name}", nargs="+", type=VALUE_TYPES[axis.kind], default=[], metavar=axis.metavar, help=axis.help
+        )
     parser.add_argument(
-        "--cutout",
+        "--variant",
         nargs="+",
-        type=float,
+        action="extend",
         default=[],
-        metavar="F",
-        help="hold out the inner fraction F of the goal region from training",
-    )
-    parser.add_argument("--alpha", nargs="+", type=float, default=[], metavar="A", help="trade-off coefficients")
-    parser.add_argument(
-        "--finetune",
-        nargs="+",
-        type=integer,
-        default=[],
-        metavar="N",
-        help="fine-tune the finished default cell on fine-tuning instance N",
-    )
-    parser.add_argument(
-        "--scratch",
-        nargs="+",
-        type=integer,
-        default=[],
-        metavar="N",
-        help="train from scratch on fine-tuning instance N",
+        metavar="AXIS=VALUE,...",
+        help="vary an axis, e.g. one that a study adds",
     )
     add_jobs(parser)
     parser.add_argument("--device", choices=DEVICES, help="where networks are updated; default: cpu")
@@ -72,30 +66,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Run the grid; 0 if all of its cells are done in the end, 1 if some failed."""
-    from codesign_bench.cell.cell import check_cells, grid, parse_seeds
+    from codesign_bench.cell.cell import resolve_cells
+    from codesign_bench.cell.grid import grid, parse_seeds, variants_of
     from codesign_bench.sweep.runner import run_sweep
 
     check_at_least_one(options, "steps", "jobs")
-    check_fractions(options.cutout, options.alpha)
-    cells = list(
-        grid(
-            tasks=chosen_names("tasks", options.task, names("tasks")),
-            methods=chosen_names("methods", options.method, paper_methods()),
-            seeds=parse_seeds(options.seeds),
-            cutouts=list(dict.fromkeys(options.cutout)),
-            alphas=list(dict.fromkeys(options.alpha)),
-            finetunes=list(dict.fromkeys(options.finetune)),
-            scratches=list(dict.fromkeys(options.scratch)),
-            profile=options.profile,
-            steps=options.steps,
-            overrides=overrides(options),
-        )
+    cells = grid(
+        tasks=chosen_tasks(options.task),
+        methods=chosen_methods(options.method),
+        seeds=parse_seeds(options.seeds),
+        variants=variants_of(axis_values(options)),
+        profile=options.profile,
+        steps=options.steps,
+        overrides=overrides(options),
     )
-    check_cells(cells)
-    _check_device(cells[0].config().run.device)
+    resolved = resolve_cells(list(cells))
+    for device in {cell.config.run.device for cell in resolved}:
+        _check_device(device)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does.
     return run_sweep(
-        cells,
+        resolved,
         options.out,
         console=console,
         jobs=options.jobs,
@@ -103,6 +93,21 @@ def run(options: argparse.Namespace, console: Console) -> int:
         backend=options.backend,
         scheduler=options.scheduler,
     )
+
+
+def axis_values(options: argparse.Namespace) -> dict[str, list[Value]]:
+    """Return the values that each axis takes: those of its own option, then those of `--variant`.
+
+    Raises:
+        UserError: an unknown axis, or a value of the wrong type.
+    """
+    values: dict[str, list[Value]] = {name: list(getattr(options, name)) for name in BUILT_IN}
+    for text in options.variant:
+        axis, equals, listed = text.partition("=")
+        if not equals or not listed:
+            raise UserError(f"--variant {text}: write it as AXIS=VALUE or AXIS=VALUE,VALUE")
+        values.setdefault(axis, []).extend(parse_axis_value(axis, value) for value in listed.split(","))
+    return values
 
 
 def overrides(options: argparse.Namespace) -> list[str]:
@@ -117,17 +122,10 @@ def overrides(options: argparse.Namespace) -> list[str]:
         result.append(f"device={options.device}")
     if options.precision is not None:
         chosen = "bf16" if options.precision == "auto" and computes_in_bfloat16() else "fp32"
-        methods = chosen_names("methods", options.method, paper_methods())
+        methods = chosen_methods(options.method)
         keys = {field.name for name in methods for field in fields(load_method(name).config_class)}
         result += [f"precision={chosen}"] if "precision" in keys else []
     return result
-
-
-def paper_methods() -> list[str]:
-    """Return what `--method all` means: the built-in methods that the methods folder itself orders."""
-    from importlib import import_module
-
-    return list(import_module("codesign_bench.methods").ORDER)
 
 
 def _check_device(device: str) -> None:

@@ -20,15 +20,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Print every value of a cell's configuration with its source."""
-    from codesign_bench.cell.cell import Cell
-    from codesign_bench.config.resolve import check_overrides
+    from codesign_bench.cell.cell import Cell, resolve_cells
     from codesign_bench.console import print_table
-    from codesign_bench.method import load_method
-    from codesign_bench.task import load_task
 
     check_at_least_one(options, "steps")
-    load_task(options.task)
-    check_overrides(options.overrides, [load_method(options.method)])
     cell = Cell(
         options.task,
         options.method,
@@ -37,10 +32,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
         steps=options.steps,
         overrides=tuple(options.overrides),
     )
+    (resolved,) = resolve_cells([cell])
     rows = [
-        (part, name, str(entry["value"]), entry["source"])
-        for part, entries in cell.config().as_json().items()
-        for name, entry in entries.items()
+        (part, name, str(value), source)
+        for part, settings in resolved.config.stored().parts.items()
+        for name, (value, source) in settings.items()
     ]
     print_table(console, ("part", "name", "value", "source"), rows)
     return 0

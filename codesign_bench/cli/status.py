@@ -11,8 +11,8 @@ from rich.console import Console
 from codesign_bench.cli.arguments import add_results
 from codesign_bench.console import print_table, printer
 from codesign_bench.errors import UserError
-from codesign_bench.storage.results import FAILED, cell_status, find_cells
-from codesign_bench.storage.status import last_line, status_row
+from codesign_bench.storage.cells import find_cells
+from codesign_bench.storage.status import status_row
 
 HELP = "what a results folder holds and how far it is"
 
@@ -34,15 +34,13 @@ def print_status(console: Console, out: Path) -> None:
     Raises:
         UserError: there is no such folder, or no cell in it.
     """
-    cells = [(folder, content, cell_status(folder, content)) for folder, content in find_cells(out)]
+    cells, log = list(find_cells(out)), printer(console)
     if not cells:
         raise UserError(f"no cells in '{out}' yet; make some with: codesign-bench run --out {out}")
-    rows = [status_row(out, folder, content, status) for folder, content, status in cells]
+    rows = [status_row(out, cell) for cell in cells]
     print_table(console, ("cell", "status", "env_steps", "of", "return", "success"), rows)
-    counts = Counter(status for _, _, status in cells)
-    summary = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
-    log = printer(console)
-    log(f"{len(cells)} cells: {summary}")
-    for folder, content, status in cells:
-        if status == FAILED:
-            log(f"{folder.relative_to(out)}: {last_line(content['failure'])}")
+    counts = Counter(cell.status for cell in cells)
+    log(f"{len(cells)} cells: {', '.join(f'{count} {status}' for status, count in sorted(counts.items()))}")
+    for cell in cells:
+        if cell.record.failure is not None:
+            log(f"{cell.folder.relative_to(out)}: {cell.record.failure.last_line}")

@@ -6,13 +6,15 @@ import argparse
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import DEFAULT_CLAIMS, add_out, add_results
+from codesign_bench.cli.arguments import DEFAULT_CLAIMS, add_out, add_results, add_study
+from codesign_bench.study import load_study
 
-HELP = "which of the paper's claims the results support"
+HELP = "which claims of a study the results support"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the folders, and whether to measure what no cell holds."""
+    add_study(parser)
     add_results(parser)
     add_out(parser, DEFAULT_CLAIMS)
     parser.add_argument(
@@ -24,5 +26,5 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Judge the claims, print the table and write it."""
     from codesign_bench.claims.verify import verify
 
-    verify(options.results, options.out, console, measure=options.measure)
+    verify(load_study(options.study), options.results, options.out, console, measure=options.measure)
     return 0

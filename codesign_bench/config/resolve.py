@@ -7,14 +7,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from codesign_bench.config.profiles import RunSettings, run_profile
+from codesign_bench.config.profiles import profile_named
+from codesign_bench.config.run_settings import RunSettings
+from codesign_bench.config.settings import METHOD, RUN, Settings, Sourced, StoredConfig, plain, sourced
 from codesign_bench.config.values import parse_value
 from codesign_bench.errors import UserError
 from codesign_bench.method import Method
+from codesign_bench.task import load_task
 
-RUN = "run"
-"""The prefix of run settings, and their part of a configuration."""
-METHOD = "method"
+ABSENT = "absent"
+"""Stands for the value of a setting that a configuration does not have."""
 
 
 @dataclass(frozen=True)
@@ -27,19 +29,18 @@ class ResolvedConfig:
     sources: Mapping[str, str]
     """Where each value comes from; keys `run.<name>` and `method.<name>`."""
 
-    def as_json(self) -> dict[str, dict[str, dict[str, Any]]]:
-        """Return part ("run", "method") -> name -> {"value", "source"}."""
+    def stored(self) -> StoredConfig:
+        """Return it as a cell file holds it."""
         parts = {RUN: self.run, METHOD: self.method}
-        return {
-            part: {
-                field.name: {
-                    "value": _as_plain(getattr(values, field.name)),
-                    "source": self.sources[f"{part}.{field.name}"],
+        return StoredConfig(
+            **{
+                part: {
+                    field.name: Sourced(plain(getattr(values, field.name)), self.sources[f"{part}.{field.name}"])
+                    for field in fields(values)
                 }
-                for field in fields(values)
+                for part, values in parts.items()
             }
-            for part, values in parts.items()
-        }
+        )
 
 
 def resolve(
@@ -48,27 +49,49 @@ def resolve(
     profile: str,
     overrides: Iterable[str] = (),
     steps: int | None = None,
+    variant_overrides: Iterable[str] = (),
 ) -> ResolvedConfig:
     """Return the configuration of `method_class` on a task under `profile`.
 
+    A value comes from the last of these that sets it: the class's default, the profile (what it sets for all, what the
+    task or the method says under its name, what it sets for this method), `--steps`, `--set`, and the variant.
+
     Args:
+        method_class: whose configuration.
+        task_name: a known task.
+        profile: a known profile.
         overrides: `key=value` or `prefix.key=value` with a method's name or `run` as prefix; keys of other methods are
             passed over.
         steps: the budget of `--steps`, or None for the profile's.
+        variant_overrides: what the cell's variant stands for, in the same form.
 
     Raises:
-        UserError: an unknown profile, a value of the wrong type or out of range.
+        UserError: an unknown task or profile, a value of the wrong type or out of range.
     """
-    run_values, run_sources = _start(RunSettings, run_profile(profile, task_name))
-    method_values, method_sources = _start(method_class.config_class, method_class.profile(profile, task_name))
+    chosen = profile_named(profile)
+    of_task = sourced(load_task(task_name).run_settings.get(profile, {}), f"tuned for {task_name} (ours)")
+    run_values, run_sources = _start(RunSettings, {**chosen.run, **of_task})
+    method_values, method_sources = _start(
+        method_class.config_class,
+        {
+            **{name: Sourced(*entry) for name, entry in method_class.profile(profile, task_name).items()},
+            **chosen.hyperparameters(method_class.name, task_name),
+        },
+    )
+    complete = _build(method_class.config_class, method_values)
+    for name, (value, source) in method_class.derived(complete, profile, task_name).items():
+        method_values[name], method_sources[name] = value, source
     if steps is not None:
         run_values["steps"], run_sources["steps"] = steps, "--steps"
-    for override in overrides:
+    for source, override in [
+        *(("--set", text) for text in overrides),
+        *(("variant", text) for text in variant_overrides),
+    ]:
         prefix, key, text = split_override(override)
         if prefix in (None, RUN) and key in run_values:
-            run_values[key], run_sources[key] = _parse_field(RunSettings, key, text), "--set"
+            run_values[key], run_sources[key] = _parse_field(RunSettings, key, text), source
         elif prefix in (None, method_class.name) and key in method_values:
-            method_values[key], method_sources[key] = _parse_field(method_class.config_class, key, text), "--set"
+            method_values[key], method_sources[key] = _parse_field(method_class.config_class, key, text), source
     return ResolvedConfig(
         run=_build(RunSettings, run_values),
         method=_build(method_class.config_class, method_values),
@@ -111,39 +134,39 @@ def split_override(override: str) -> tuple[str | None, str, str]:
     return (prefix if dot else None), key, text.strip()
 
 
-def method_config(config_class: type, stored: Mapping[str, Mapping[str, Any]]) -> Any:
-    """Rebuild a method's configuration from the `method` part of `ResolvedConfig.as_json`.
+def method_config(config_class: type, stored: Settings) -> Any:
+    """Rebuild a method's configuration from the `method` part of a `StoredConfig`.
 
     Raises:
         UserError: it does not fit the method's present configuration.
     """
     hints = typing.get_type_hints(config_class)
     try:
-        values = {name: _restore(hints[name], entry["value"]) for name, entry in stored.items()}
+        values = {name: _restore(hints[name], entry.value) for name, entry in stored.items()}
         return config_class(**values)
     except (KeyError, TypeError, ValueError) as error:
         raise UserError(f"the stored configuration does not fit {config_class.__qualname__}: {error}") from error
 
 
-def differences(stored: Mapping[str, Any], resolved: ResolvedConfig) -> list[str]:
-    """Return "name: stored value, asked value" for each value in which `ResolvedConfig.as_json` and `resolved` differ.
+def differences(stored: StoredConfig, resolved: ResolvedConfig) -> list[str]:
+    """Return "name: stored X, requested Y" for each value in which a stored and a resolved configuration differ.
 
     A name that the stored configuration lacks did not exist when it was stored: it counts as the class's default,
     which is why a new hyperparameter's default must mean "as before".
     """
     found = []
+    requested = resolved.stored()
     for part, values in ((RUN, resolved.run), (METHOD, resolved.method)):
-        old, new, defaults = stored.get(part, {}), resolved.as_json()[part], type(values)()
+        old, new, defaults = stored.parts[part], requested.parts[part], type(values)()
         for name in dict.fromkeys((*old, *new)):
-            absent = _as_plain(getattr(defaults, name, "absent"))
-            before = old.get(name, {}).get("value", absent)
-            after = new.get(name, {}).get("value", "absent")
+            before = old[name].value if name in old else plain(getattr(defaults, name, ABSENT))
+            after = new[name].value if name in new else ABSENT
             if before != after:
-                found.append(f"{name}: there {before}, asked {after}")
+                found.append(f"{name}: stored {before}, requested {after}")
     return found
 
 
-def _start(config_class: type, profile: Mapping[str, tuple[Any, str]]) -> tuple[dict[str, Any], dict[str, str]]:
+def _start(config_class: type, profile: Settings) -> tuple[dict[str, Any], dict[str, str]]:
     """Return the defaults of a dataclass with a profile laid over them, and every value's source."""
     defaults = config_class()
     values = {field.name: getattr(defaults, field.name) for field in fields(defaults)}
@@ -167,11 +190,6 @@ def _parse_field(config_class: type, name: str, text: str) -> Any:
         return parse_value(typing.get_type_hints(config_class)[name], text)
     except ValueError as error:
         raise UserError(f"--set {name}={text}: expected {error}") from error
-
-
-def _as_plain(value: Any) -> Any:
-    """Return the JSON form of a value: tuples become lists, so that stored and resolved values compare."""
-    return [_as_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _restore(annotation: Any, value: Any) -> Any:

@@ -38,7 +38,7 @@ def parse_value(annotation: Any, text: str) -> Any:
 
 
 def parse_int(text: str) -> int:
-    """Return a whole number written as 150000, 150_000 or 1.5e5.
+    """Return an integer written as 150000, 150_000 or 1.5e5.
 
     Raises:
         ValueError: it is none.
@@ -49,7 +49,7 @@ def parse_int(text: str) -> int:
             return int(text) if text.lstrip("+-").replace("_", "").isdigit() else int(number)
     except (ValueError, OverflowError):
         pass
-    raise ValueError("a whole number")
+    raise ValueError("an integer")
 
 
 def _parse_union(choices: tuple[Any, ...], text: str) -> Any:

@@ -24,7 +24,7 @@ from codesign_bench.deployment.tables import (
 from codesign_bench.errors import UserError
 from codesign_bench.seeding import generator
 from codesign_bench.storage.files import write_bytes, write_json
-from codesign_bench.storage.results import open_folder, write_rows
+from codesign_bench.storage.layout import open_folder, write_rows
 from codesign_bench.task import Behaviour, Task, deployment_of
 
 

@@ -83,12 +83,12 @@ def _play(task: Task, policy: Behaviour, tradeoff: Tradeoff | None, instances: F
     )
 
 
-def rows(task: Task, evaluation: Evaluation, cutout: float | None = None) -> Iterator[dict[str, Any]]:
+def rows(task: Task, evaluation: Evaluation, cutout: float = 0.0) -> Iterator[dict[str, Any]]:
     """Yield one table row per instance: instance and design by entry name, and the outcome.
 
-    With `cutout`, `in_cutout` tells the instances that were never trained on.
+    With a `cutout`, `in_cutout` tells the instances that were held out.
     """
-    unseen = None if cutout is None else task.in_cutout(evaluation.instances, cutout)
+    unseen = None if cutout == 0.0 else task.in_cutout(evaluation.instances, cutout)
     for index in range(len(evaluation.returns)):
         yield {
             **_named("instance", task.instance_space.names, evaluation.instances[index]),

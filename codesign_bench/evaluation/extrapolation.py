@@ -8,18 +8,20 @@ Shapes: `N` instances, `I` instance, `B` batch, `D` design, `C` control.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from codesign_bench.cell.variant import DEFAULT, Variant
+from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.seeding import generator
-from codesign_bench.storage.files import write_bytes
-from codesign_bench.storage.policies import load_policy
-from codesign_bench.storage.results import DEFAULT_VARIANT, DONE, POLICY_FILE, find_cells
+from codesign_bench.storage.cells import StoredCell, find_cells
+from codesign_bench.storage.policies import policy_of
+from codesign_bench.storage.tables import read_table, write_table
 from codesign_bench.task import EVALUATION_SEED, Floats, Task, load_task
 from codesign_bench.task.behaviours import Idle
 
@@ -54,11 +56,7 @@ def outside_instances(task: Task) -> Floats:
 
 
 def load_or_measure(
-    results: Path,
-    pairs: Sequence[tuple[str, str]],
-    say: Callable[[str], None],
-    measure_missing: bool,
-    variant: str = DEFAULT_VARIANT,
+    results: Path, pairs: Sequence[tuple[str, str]], log: Log, measure_missing: bool, variant: Variant = DEFAULT
 ) -> pd.DataFrame:
     """Return what the finished cells of each (task, method) in a variant reach outside, one row per seed and instance.
 
@@ -69,43 +67,57 @@ def load_or_measure(
     """
     import pandas as pd
 
-    frames = []
+    tables = []
     for task, method in pairs:
-        path = results / FOLDER / f"{'-'.join([task, method, *([] if variant == DEFAULT_VARIANT else [variant])])}.csv"
-        table = pd.read_csv(path) if path.exists() else pd.DataFrame(columns=list(COLUMNS))
-        seeds = set(table["seed"])
+        path = _path(results, task, method, variant)
+        table = read_table(path)
+        seeds = set() if table is None else set(table["seed"])
         new = {seed: cell for seed, cell in _finished(results, task, method, variant).items() if seed not in seeds}
         if measure_missing and new:
-            say(f"{FOLDER}: playing {len(new)} policies of {task}/{method}/{variant}; kept in {path}")
-            table = pd.concat([*([table] if len(table) else []), _measure(task, method, new)], ignore_index=True)
-            path.parent.mkdir(exist_ok=True)
-            write_bytes(path, table.to_csv(index=False, lineterminator="\n").encode())
-        if len(table):
-            frames.append(table)
-    if not frames:
+            log(f"{FOLDER}: playing {len(new)} policies of {task}/{method}/{variant.name}; kept in {path}")
+            table = pd.concat([*([] if table is None else [table]), _measure(task, method, new)], ignore_index=True)
+            write_table(results, path, table)
+        if table is not None:
+            tables.append(table)
+    if not tables:
         raise UserError(f"not measured yet; measure it with: codesign-bench verify --measure --results {results}")
-    return pd.concat(frames, ignore_index=True)
+    return pd.concat(tables, ignore_index=True)
 
 
-def _finished(results: Path, task: str, method: str, variant: str) -> dict[int, Path]:
-    """Return the folders of finished cells that hold their policies, by seed."""
+def load_outside(results: Path) -> pd.DataFrame:
+    """Return what was measured of cells that vary nothing, all tasks and methods below each other.
+
+    Raises:
+        UserError: nothing is measured yet.
+    """
+    varying_nothing = (cell.record for cell in find_cells(results) if cell.record.variant == DEFAULT)
+    pairs = list(dict.fromkeys((record.task, record.method) for record in varying_nothing))
+    return load_or_measure(results, pairs, silent, measure_missing=False)
+
+
+def _path(results: Path, task: str, method: str, variant: Variant) -> Path:
+    name = "-".join([task, method, *([] if variant == DEFAULT else [variant.name])])
+    return results / FOLDER / f"{name}.csv"
+
+
+def _finished(results: Path, task: str, method: str, variant: Variant) -> dict[int, StoredCell]:
+    """Return the finished cells that hold their policies, by seed."""
+    wanted = (task, method, variant)
     return {
-        int(content["seed"]): folder
-        for folder, content in find_cells(results)
-        if (content["task"], content["method"], content["variant"]) == (task, method, variant)
-        and content["status"] == DONE
-        and (folder / POLICY_FILE).exists()
+        cell.record.seed: cell
+        for cell in find_cells(results)
+        if (cell.record.task, cell.record.method, cell.record.variant) == wanted and cell.is_done and cell.has_policy
     }
 
 
-def _measure(name: str, method: str, cells: dict[int, Path]) -> pd.DataFrame:
+def _measure(name: str, method: str, cells: dict[int, StoredCell]) -> pd.DataFrame:
     import pandas as pd
 
     task = load_task(name)
     instances = outside_instances(task)
     parts = []
-    for seed, folder in cells.items():
-        evaluation = evaluate(task, load_policy(folder), instances=instances)
+    for seed, cell in cells.items():
+        evaluation = evaluate(task, policy_of(cell), instances=instances)
         columns = {"return": evaluation.returns, "success": evaluation.successes.astype(int)}
         places = task.instance_space.names
         positions = {f"instance_{entry}": instances[:, index] for index, entry in enumerate(places)}

@@ -9,18 +9,18 @@ Shapes: `K` tools, `G` goals (evaluation instances), `D` design.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from joblib import Parallel, delayed
 
+from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.seeding import generator
-from codesign_bench.storage.files import write_bytes
-from codesign_bench.storage.results import open_folder
+from codesign_bench.storage.tables import read_table, write_table
 from codesign_bench.task import EVALUATION_SEED, Floats, Task, load_task, task_names
 from codesign_bench.task.behaviours import GivenDesigns
 from codesign_bench.task.episodes import Episodes
@@ -84,32 +84,41 @@ def measure(name: str, random_tools: int = RANDOM_TOOLS, goals: int = GOALS, job
     )
 
 
-def load_or_measure(results: Path, say: Callable[[str], None], measure_missing: bool) -> pd.DataFrame:
-    """Return the tables of all tasks below `results`; measure those that are missing, if asked to.
+def measure_missing(results: Path, tasks: Iterable[str], log: Log) -> None:
+    """Measure the tables of `tasks` that are missing below `results`; tasks that cannot be measured are left out.
 
     Raises:
-        UserError: there is none and none may be measured.
+        UserError: the folder cannot be written.
+    """
+    for name in tasks:
+        path = _path(results, name)
+        if path.exists():
+            continue
+        log(f"{FOLDER}: playing {RANDOM_TOOLS} random tools on {GOALS} goals of {name}; kept in {path}")
+        try:
+            table = measure(name, jobs=os.cpu_count() or 1)
+        except UserError as error:
+            log(f"{FOLDER}: {name} left out: {error}")
+            continue
+        write_table(results, path, table)
+
+
+def load_sensitivity(results: Path) -> pd.DataFrame:
+    """Return the tables of all tasks below `results`.
+
+    Raises:
+        UserError: there is none.
     """
     import pandas as pd
 
-    frames = []
-    for name in task_names():
-        path = results / FOLDER / f"{name}.csv"
-        if not path.exists() and measure_missing:
-            say(f"{FOLDER}: playing {RANDOM_TOOLS} random tools on {GOALS} goals of {name}; kept in {path}")
-            try:
-                table = measure(name, jobs=os.cpu_count() or 1)
-            except UserError as error:
-                say(f"{FOLDER}: {name} left out: {error}")
-                continue
-            open_folder(results)
-            path.parent.mkdir(exist_ok=True)
-            write_bytes(path, table.to_csv(index=False, lineterminator="\n").encode())
-        if path.exists():
-            frames.append(pd.read_csv(path))
-    if not frames:
+    tables = [table for name in task_names() if (table := read_table(_path(results, name))) is not None]
+    if not tables:
         raise UserError(f"not measured yet; measure it with: codesign-bench plot {FOLDER} --results {results}")
-    return pd.concat(frames, ignore_index=True)
+    return pd.concat(tables, ignore_index=True)
+
+
+def _path(results: Path, task_name: str) -> Path:
+    return results / FOLDER / f"{task_name}.csv"
 
 
 def _play(name: str, designs: Floats, instances: Floats) -> tuple[Floats, Floats, Floats]:

@@ -10,9 +10,10 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
 
+from codesign_bench.cell.variant import DEFAULT
 from codesign_bench.errors import UserError
-from codesign_bench.storage.policies import load_policy
-from codesign_bench.storage.results import DEFAULT_VARIANT, DONE, find_cells
+from codesign_bench.storage.cells import StoredCell, find_cells
+from codesign_bench.storage.policies import policy_of
 from codesign_bench.task import load_task
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.play import designed
@@ -38,22 +39,23 @@ def timing_frame(results: Path) -> pd.DataFrame:
 
     rows = []
     timed: set[tuple[str, str]] = set()
-    for folder, content in find_cells(results):
-        if content["status"] != DONE or content["variant"] != DEFAULT_VARIANT:
+    for cell in find_cells(results):
+        record = cell.record
+        if not cell.is_done or record.variant != DEFAULT:
             continue
-        pair = (content["task"], content["method"])
+        pair = (record.task, record.method)
         rows.append(
             {
-                "task": content["task"],
-                "method": content["method"],
-                "label": content.get("label", content["method"]),
-                "seed": content["seed"],
-                "profile": content["profile"],
-                "env_steps": content["env_steps"],
-                "train_s": content["timings"]["train_s"],
-                "cores": content["host"]["threads"],
-                "cpu": content["host"]["cpu"],
-                "inference_s": float("nan") if pair in timed else inference_seconds(folder, content["task"]),
+                "task": record.task,
+                "method": record.method,
+                "label": record.label,
+                "seed": record.seed,
+                "profile": record.profile,
+                "env_steps": record.env_steps,
+                "train_s": record.timings.train_s,
+                "cores": record.threads,
+                "cpu": record.host["cpu"],
+                "inference_s": float("nan") if pair in timed else inference_seconds(cell),
             }
         )
         timed.add(pair)
@@ -62,9 +64,9 @@ def timing_frame(results: Path) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def inference_seconds(folder: Path, task_name: str) -> float:
+def inference_seconds(cell: StoredCell) -> float:
     """Return the median time of one call of the cell's policy in the control phase, on one observation, in s."""
-    task, policy = load_task(task_name), load_policy(folder)
+    task, policy = load_task(cell.record.task), policy_of(cell)
     episodes = Episodes(task, 1)
     designed(episodes, policy, task.evaluation_instances()[:1])
     observation = episodes.observation[0].copy()

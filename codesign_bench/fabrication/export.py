@@ -19,7 +19,7 @@ from codesign_bench.fabrication.picture import picture
 from codesign_bench.fabrication.printability import Print, judge
 from codesign_bench.fabrication.solids import MILLIMETRES, handle_of, scaled, thickness, tool_solid
 from codesign_bench.storage.files import write_bytes, write_json
-from codesign_bench.storage.results import write_rows
+from codesign_bench.storage.layout import write_rows
 from codesign_bench.task import Behaviour, Box, Floats, Task
 from codesign_bench.task.episodes import Episodes, portions
 from codesign_bench.task.play import designed

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from codesign_bench.storage.results import LABEL_COLUMN, load_results
+from codesign_bench.storage.frames import LABEL_COLUMN, load_results
 
 if TYPE_CHECKING:
     import pandas as pd

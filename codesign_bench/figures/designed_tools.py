@@ -5,10 +5,8 @@ Shapes: `N` evaluation instances, `G` goal, `I` instance.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,8 +14,9 @@ from numpy.typing import NDArray
 
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.rendering import render_slot
+from codesign_bench.figures.source import Request
 from codesign_bench.registry import names
-from codesign_bench.storage.results import load_evaluations
+from codesign_bench.storage.frames import default_rows, load_evaluations, rows_varying
 from codesign_bench.task import Box, Floats, Frame, Task, load_task
 from codesign_bench.task.behaviours import GivenDesigns, Idle
 from codesign_bench.task.episodes import Episodes
@@ -41,7 +40,7 @@ class Place:
     column: int
 
 
-def designed_tools(results: Path, say: Callable[[str], None]) -> pd.DataFrame:
+def designed_tools(request: Request) -> pd.DataFrame:
     """Return pictures of the tools of one designer per task and variant, right after the design step.
 
     Variants are `default` and those of the trade-off. The designer is the first method in the order of methods that
@@ -57,16 +56,16 @@ def designed_tools(results: Path, say: Callable[[str], None]) -> pd.DataFrame:
     """
     import pandas as pd
 
-    frame = load_evaluations(results)
-    frame = frame[frame["variant"].str.fullmatch(r"default|alpha-[\d.]+")]
+    evaluations = load_evaluations(request.results)
+    frame = pd.concat([default_rows(evaluations), rows_varying(evaluations, "alpha")])
     parts = []
     for (name, _), rows in frame.groupby(["task", "variant"], sort=False):
         try:
             parts.append(_pictures(load_task(str(name)), _one_cell(rows)))
         except UserError as error:
-            say(f"tools for {name} left out: {error}")
+            request.log(f"tools for {name} left out: {error}")
     if not parts:
-        raise UserError(f"no finished cell in '{results}' whose tools can be drawn")
+        raise UserError(f"no finished cell in '{request.results}' whose tools can be drawn")
     return pd.concat(parts, ignore_index=True)
 
 

@@ -5,15 +5,16 @@ Shapes: `N` evaluation instances, `P` places, `I` instance.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from codesign_bench.cell.variant import Variant
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.extrapolation import load_or_measure
-from codesign_bench.storage.results import DEFAULT_VARIANT, load_evaluations
+from codesign_bench.figures.source import Request
+from codesign_bench.storage.frames import default_rows, load_evaluations, rows_varying
 from codesign_bench.task import Floats, Task, load_task
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ PLACES = 14_400
 """Places of a grid, however many axes it has."""
 
 
-def outcomes_by_region(results: Path, say: Callable[[str], None], measure: bool = False) -> pd.DataFrame:
+def outcomes_by_region(request: Request) -> pd.DataFrame:
     """Return the evaluations of all cells with a cutout, and the places that tell where the regions lie.
 
     Cells of the same method and task that trained on the whole region stand beside them as fraction 0. What policies
@@ -51,35 +52,34 @@ def outcomes_by_region(results: Path, say: Callable[[str], None], measure: bool 
     """
     import pandas as pd
 
-    frame = load_evaluations(results)
-    with_cutout = frame[frame["variant"].str.fullmatch(r"cutout-[\d.]+")]
+    frame = load_evaluations(request.results)
+    with_cutout = rows_varying(frame, "cutout")
     pairs = with_cutout[["task", "method"]].drop_duplicates()
-    whole = frame[frame["variant"] == DEFAULT_VARIANT].merge(pairs).assign(cutout=0.0)
+    whole = default_rows(frame).merge(pairs).assign(cutout=0.0)
     parts = []
     inside = pd.concat([whole, with_cutout])
-    for name, rows in pd.concat([inside, *_around(results, inside, say, measure)]).groupby("task", sort=False):
+    for name, rows in pd.concat([inside, *_around(request, inside)]).groupby("task", sort=False):
         try:
             task = load_task(str(name))
             parts.append(_starts(task, rows))
             parts += [_places(task, float(fraction)) for fraction in np.unique(rows["cutout"])]
         except UserError as error:
-            say(f"generalisation on {name} left out: {error}")
+            request.log(f"generalisation on {name} left out: {error}")
     if not parts:
-        raise UserError(
-            f"no finished cell with a cutout in '{results}'; make some with: codesign-bench run --cutout 0.6"
-        )
+        raise UserError(f"no finished cell with a cutout in '{request.results}'")
     return pd.concat(parts, ignore_index=True)
 
 
-def _around(results: Path, inside: pd.DataFrame, say: Callable[[str], None], measure: bool) -> Iterator[pd.DataFrame]:
+def _around(request: Request, inside: pd.DataFrame) -> Iterator[pd.DataFrame]:
     """Yield for every task, method and variant of `inside` what its policies reach around the training region."""
-    told = ["task", "method", "label", "variant", "cutout"]
-    for task, method, label, variant, cutout in inside[told].drop_duplicates().itertuples(index=False):
+    keys = ["task", "method", "label", "variant", "cutout"]
+    for task, method, label, variant, cutout in inside[keys].drop_duplicates().itertuples(index=False):
+        varied = Variant.of(cutout=cutout or None)
         try:
-            table = load_or_measure(results, [(task, method)], say, measure, variant)
+            table = load_or_measure(request.results, [(task, method)], request.log, request.named, varied)
         except UserError as error:
-            if measure:  # otherwise it is just not measured yet: the region then has no line
-                say(f"around the region, {task}/{method}/{variant} left out: {error}")
+            if request.named:  # otherwise it is just not measured yet: the region then has no line
+                request.log(f"around the region, {task}/{method}/{variant} left out: {error}")
             continue
         yield table.assign(label=label, variant=variant, cutout=cutout)
 

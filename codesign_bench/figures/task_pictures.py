@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.evaluation.rendering import render_slot
-from codesign_bench.task import Task, load_task
+from codesign_bench.figures.source import Request, tasks_in
+from codesign_bench.task import Task, load_task, task_names
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.play import play
 
@@ -21,8 +21,8 @@ MOMENT = 0.6
 """Which share of the episode has passed: the tool has met the object and has not finished."""
 
 
-def tasks_at_work(task_names: Iterable[str], say: Callable[[str], None]) -> pd.DataFrame:
-    """Return one picture of each task.
+def tasks_at_work(request: Request) -> pd.DataFrame:
+    """Return one picture of each task that the results have; if the figure was named, of every known task.
 
     Returns:
         Columns task, title, instance (its number), step (of the picture), steps (of the whole episode), return and
@@ -34,11 +34,11 @@ def tasks_at_work(task_names: Iterable[str], say: Callable[[str], None]) -> pd.D
     import pandas as pd
 
     rows = []
-    for name in task_names:
+    for name in task_names() if request.named else tasks_in(request.results):
         try:
             rows.append(_at_work(load_task(name)))
         except UserError as error:
-            say(f"picture of {name} left out: {error}")
+            request.log(f"picture of {name} left out: {error}")
     if not rows:
         raise UserError("no task here has both a script and pictures")
     return pd.DataFrame(rows)

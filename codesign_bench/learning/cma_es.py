@@ -16,8 +16,6 @@ import cma
 import numpy as np
 
 from codesign_bench.config.validation import check_range
-from codesign_bench.learning.profiles import sourced
-from codesign_bench.studies.corl2023.learners import CMA_ES_SWEEP
 from codesign_bench.task import Floats
 
 PYCMA = {"source": "pycma's default"}
@@ -45,20 +43,6 @@ class EvolutionConfig:
         check_range(self, 1e-12, inf, "sigma0")
         check_range(self, 0, 1, "center_learning_rate", "covariance_learning_rate")
         check_range(self, 0, 1, "rank_mu_learning_rate", "rank_one_learning_rate")
-
-
-def paper_evolution() -> dict[str, tuple[Any, str]]:
-    """Return the settings that came out best in the paper's sweep."""
-    sweep = CMA_ES_SWEEP
-    best = {
-        "popsize": int(sweep.population_size.best),
-        "sigma0": sweep.sigma0.best,
-        "center_learning_rate": sweep.center_learning_rate.best,
-        "covariance_learning_rate": sweep.covariance_learning_rate.best,
-        "rank_mu_learning_rate": sweep.rank_mu_learning_rate.best,
-        "rank_one_learning_rate": sweep.rank_one_learning_rate.best,
-    }
-    return sourced(best, "paper, table of baseline hyperparameters (bold)")
 
 
 class Evolution:

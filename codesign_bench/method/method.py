@@ -69,9 +69,17 @@ class Method(ABC, Generic[ConfigType]):
         self.streams = streams
 
     @classmethod
-    @abstractmethod
     def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
-        """Return what `profile` sets for the task: key -> (value, source); unknown tasks get its general values."""
+        """Return what the method itself sets in `profile`: key -> (value, source). By default its defaults hold.
+
+        Profiles of studies may set more; a profile or a task that the method does not know gets general values.
+        """
+        return {}
+
+    @classmethod
+    def derived(cls, config: ConfigType, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
+        """Return settings that follow from the others of `config`, each with its source; by default none."""
+        return {}
 
     def use_cores(self, count: int) -> None:
         """Use up to `count` cores from now on; no number may depend on it. By default a method uses one."""
@@ -85,7 +93,7 @@ class Method(ABC, Generic[ConfigType]):
         Raises:
             UserError: the method cannot.
         """
-        raise UserError(f"method '{self.name}' cannot go on from a trained policy")
+        raise UserError(f"method '{self.name}' cannot start from a trained policy")
 
     @abstractmethod
     def train(self, remaining_steps: int) -> BatchReport:

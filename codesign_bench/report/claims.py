@@ -1,4 +1,4 @@
-"""The paper's claims as the page tells them: what results say of each, and by which rule."""
+"""A study's claims as the page tells them: what results say of each, and by which rule."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from codesign_bench.claims.evidence import load_evidence
 from codesign_bench.claims.verify import Row, judge, missing, summary
 from codesign_bench.errors import UserError
-from codesign_bench.studies.corl2023.claims import CLAIMS
+from codesign_bench.study.study import Study
 
 from .tables import NOTHING, Table
 
@@ -29,17 +29,18 @@ class ClaimsPart:
     """What makes the missing data."""
 
 
-def claims_part(results: Path) -> ClaimsPart:
-    """Judge the paper's claims on the folder `results`."""
+def claims_part(results: Path, study: Study) -> ClaimsPart:
+    """Judge the claims of a study on the folder `results`."""
     try:
-        return part(judge(CLAIMS, load_evidence(results), str(results)))
+        return part(judge(study.claims(), load_evidence(results), str(results)))
     except UserError as error:  # nothing has finished yet, or a table cannot be read
         return ClaimsPart(f"No claim was judged: {error}", None, None, None, [])
 
 
 def part(rows: Sequence[Row]) -> ClaimsPart:
     """Return judged claims as the page shows them: those with data first, those without below, folded."""
-    with_data, without = [row for row in rows if not row.needs], [row for row in rows if row.needs]
+    with_data = [row for row in rows if not row.needs]
+    without = [row for row in rows if row.asked and row.needs]
     found = [
         (
             row.finding.verdict,

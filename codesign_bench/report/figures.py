@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from codesign_bench.figures.drawing import Drawing, csv_bytes, possible_drawings
+from codesign_bench.console import Log
+from codesign_bench.figures.drawing import Drawing, possible_drawings
+from codesign_bench.storage.tables import csv_bytes
+from codesign_bench.study.study import Study
 from codesign_bench.text_tables import is_number, read_markdown
 
 from .tables import Table
@@ -37,9 +39,9 @@ class FigurePart:
     """Ending and content of every other text that the figure comes with."""
 
 
-def figure_parts(results: Path, say: Callable[[str], None]) -> list[FigurePart]:
-    """Return every figure that the results allow; `say` is told which are left out, and why."""
-    return [_part(drawing) for drawing in possible_drawings(results, say)]
+def figure_parts(results: Path, study: Study, log: Log) -> list[FigurePart]:
+    """Return every figure of a study that the results allow; `log` shows which are left out, and why."""
+    return [_part(drawing) for drawing in possible_drawings(results, log, study)]
 
 
 def data_uri(kind: str, content: bytes) -> str:

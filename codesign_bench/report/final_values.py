@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from codesign_bench.registry import in_order
 from codesign_bench.seeding import generator
 from codesign_bench.stats import (
     CELL_KEYS,
@@ -23,9 +24,9 @@ from codesign_bench.stats import (
     mean_interval,
     probability_of_improvement,
 )
-from codesign_bench.storage.results import DONE
+from codesign_bench.storage.records import DONE
 
-from .cells import CellRecord, in_order, variants
+from .cells import PageCell, variants
 from .tables import NOTHING, number
 
 SEED = 0
@@ -96,14 +97,14 @@ class TaskResult:
     verdict: str
 
 
-def task_results(cells: Sequence[CellRecord], curves: pd.DataFrame) -> list[TaskResult]:
+def task_results(cells: Sequence[PageCell], curves: pd.DataFrame) -> list[TaskResult]:
     """Return final return and success of every task, variant and method that has a finished cell.
 
     Args:
         cells: all cells of the results folder.
         curves: rows as `codesign_bench.load_results` gives them, of the same folder.
     """
-    done = {(cell.task, cell.method, cell.variant, int(cell.content["seed"])) for cell in cells if cell.status == DONE}
+    done = {(cell.task, cell.method, cell.variant, cell.record.seed) for cell in cells if cell.status == DONE}
     rows = zip(*(curves[name] for name in (*CELL_KEYS, "seed")), strict=True)
     finished = curves[[row in done for row in rows]]
     if finished.empty:
@@ -151,7 +152,7 @@ def verdict(estimates: Sequence[tuple[str, Estimate]]) -> str:
     return f"{lead} {told} {'The first is ahead.' if low > 0.0 else 'The interval holds 0: the order may be chance.'}"
 
 
-def _task_result(cells: Sequence[CellRecord], task: str, variant: str, final: pd.DataFrame) -> TaskResult:
+def _task_result(cells: Sequence[PageCell], task: str, variant: str, final: pd.DataFrame) -> TaskResult:
     """Return the result of one task and variant; `final` has one row per finished cell."""
     group = [cell for cell in cells if (cell.task, cell.variant) == (task, variant)]
     axis = float(final["return_mean"].min()), float(final["return_mean"].max())

@@ -5,7 +5,7 @@ The page runs no script, and whatever results hold is shown as text: a traceback
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -14,15 +14,18 @@ import jinja2
 import pandas as pd
 from markupsafe import Markup, escape
 
+from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.figures.drawing import make_folder
 from codesign_bench.stats import CELL_KEYS
 from codesign_bench.storage.files import write_bytes
-from codesign_bench.storage.results import CURVE_COLUMNS, load_results
+from codesign_bench.storage.frames import load_results
+from codesign_bench.storage.layout import CURVE_COLUMNS
+from codesign_bench.study.study import DEFAULT_STUDY, Study, load_study
 
 from . import cells as cell_parts
 from . import provenance
-from .cells import CellRecord, Failure, read_cells
+from .cells import CellFailure, PageCell, read_cells
 from .claims import ClaimsPart, claims_part
 from .figures import FigurePart, figure_parts
 from .final_values import STRIP_WIDTH, TaskResult, task_results
@@ -36,6 +39,8 @@ TEMPLATE = "page.html.j2"
 class Page:
     """All that the page tells, in its order."""
 
+    study: Study
+    """Whose figures and claims it has."""
     facts: list[tuple[str, str]]
     results: list[TaskResult]
     claims: ClaimsPart
@@ -43,7 +48,7 @@ class Page:
     left_out: list[str]
     """Why some figures are missing."""
     status: Table
-    failures: list[Failure]
+    failures: list[CellFailure]
     damaged: list[str]
     """Cells that could not be read."""
     cells: Table
@@ -56,8 +61,14 @@ class Page:
     made: str
 
 
-def write_report(results: Path, out: Path, say: Callable[[str], None]) -> None:
-    """Write the page on everything below `results` to the file `out`, and tell its path.
+def write_report(results: Path, out: Path, log: Log, study: Study | None = None) -> None:
+    """Write the page on everything below `results` to the file `out`, and log its path.
+
+    Args:
+        results: a results folder.
+        out: an HTML file.
+        log: shows the path.
+        study: whose figures and claims the page has; None: the default one.
 
     Raises:
         UserError: there is no such folder or no cell in it, or `out` is no file that can be written.
@@ -68,18 +79,20 @@ def write_report(results: Path, out: Path, say: Callable[[str], None]) -> None:
         raise UserError(f"--out {out}: is a folder; name a file in it, e.g. {out / 'report.html'}")
     cells, damaged = read_cells(results)
     make_folder(out.parent)
-    write_bytes(out, render(gather(results, cells, damaged)).encode())
-    say(str(out))
+    page = gather(results, cells, damaged, study or load_study(DEFAULT_STUDY))
+    write_bytes(out, render(page).encode())
+    log(str(out))
 
 
-def gather(results: Path, cells: Sequence[CellRecord], damaged: list[str]) -> Page:
+def gather(results: Path, cells: Sequence[PageCell], damaged: list[str], study: Study) -> Page:
     """Return all that the page tells of the folder `results` and its cells, as `read_cells` returned them."""
     left_out: list[str] = []
     return Page(
+        study=study,
         facts=cell_parts.facts(results, cells),
         results=task_results(cells, _curves(results)),
-        claims=claims_part(results),
-        figures=figure_parts(results, left_out.append),
+        claims=claims_part(results, study),
+        figures=figure_parts(results, study, left_out.append),
         left_out=left_out,
         status=cell_parts.status_table(cells),
         failures=cell_parts.failures(cells),

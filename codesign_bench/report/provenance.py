@@ -11,10 +11,11 @@ from statistics import median
 from typing import Any
 
 import codesign_bench
-from codesign_bench.config.resolve import METHOD, RUN
+from codesign_bench.config.settings import METHOD, RUN
 from codesign_bench.console import duration
+from codesign_bench.registry import in_order
 
-from .cells import CellRecord, in_order
+from .cells import PageCell
 from .tables import NOTHING, Table, listed
 
 GIT_SECONDS = 10.0
@@ -30,7 +31,7 @@ class Configuration:
     table: Table
 
 
-def configurations(cells: Sequence[CellRecord]) -> list[Configuration]:
+def configurations(cells: Sequence[PageCell]) -> list[Configuration]:
     """Return every method's configuration: one row per setting, or one for each of its values where cells differ."""
     found = []
     for method in in_order("methods", (cell.method for cell in cells)):
@@ -40,47 +41,50 @@ def configurations(cells: Sequence[CellRecord]) -> list[Configuration]:
     return found
 
 
-def version_table(cells: Sequence[CellRecord]) -> Table:
+def version_table(cells: Sequence[PageCell]) -> Table:
     """Return the version of every package that cells record, with the cells where they differ."""
-    packages = dict.fromkeys(name for cell in cells for name in cell.content["versions"])
+    packages = dict.fromkeys(name for cell in cells for name in cell.record.versions)
     rows = []
     for name in packages:
 
-        def version(cell: CellRecord, name: str = name) -> str:
-            return str(cell.content["versions"].get(name) or "not installed")
+        def version(cell: PageCell, name: str = name) -> str:
+            return str(cell.record.versions.get(name) or "not installed")
 
         rows += [(name, found, where(group, cells)) for found, group in _grouped(cells, version)]
     return Table(("package", "version", "cells"), rows)
 
 
-def machine_table(cells: Sequence[CellRecord]) -> Table:
+def machine_table(cells: Sequence[PageCell]) -> Table:
     """Return the machines that cells ran on."""
     names = ("name", "system", "cpu", "cores")
     rows = []
-    for facts, group in _grouped(cells, lambda cell: tuple(str(cell.content["host"].get(name)) for name in names)):
-        threads = sorted({str(cell.content["host"].get("threads")) for cell in group})
+    for facts, group in _grouped(cells, lambda cell: tuple(str(cell.record.host.get(name)) for name in names)):
+        threads = sorted({str(cell.record.host.get("threads")) for cell in group})
         rows.append((*facts, ", ".join(threads), str(len(group))))
     header = ("machine", "system", "processor", "cores", "threads per cell", "cells")
     return Table(header, rows, numeric=frozenset(header[3:]))
 
 
-def time_table(cells: Sequence[CellRecord]) -> Table:
+def time_table(cells: Sequence[PageCell]) -> Table:
     """Return per task and method how long finished cells took, in the median, and in all."""
     rows = []
     for task in in_order("tasks", (cell.task for cell in cells)):
         for method in in_order("methods", (cell.method for cell in cells if cell.task == task)):
-            group = [cell.content["timings"] for cell in cells if (cell.task, cell.method) == (task, method)]
-            known = [timings for timings in group if timings.get("wall_s") is not None]
-            spent = duration(sum(float(timings["wall_s"]) for timings in known)) if known else NOTHING
-            rows.append((task, method, str(len(known)), _median(known, "train_s"), _median(known, "evaluate_s"), spent))
+            group = [cell.record.timings for cell in cells if (cell.task, cell.method) == (task, method)]
+            walls = [timings.wall_s for timings in group if timings.wall_s is not None]
+            training = _median(timings.train_s for timings in group)
+            evaluation = _median(timings.evaluate_s for timings in group)
+            rows.append(
+                (task, method, str(len(walls)), training, evaluation, duration(sum(walls)) if walls else NOTHING)
+            )
     header = ("task", "method", "cells", "training, median", "evaluation, median", "in all")
     return Table(header, rows, numeric=frozenset(header[2:]))
 
 
-def period(cells: Sequence[CellRecord]) -> str:
+def period(cells: Sequence[PageCell]) -> str:
     """Return when the first cell started and the last one ended."""
-    started = [str(cell.content["timings"].get("started") or "") for cell in cells]
-    ended = [str(cell.content["timings"].get("ended") or "") for cell in cells]
+    started = [cell.record.timings.started or "" for cell in cells]
+    ended = [cell.record.timings.ended or "" for cell in cells]
     first, last = min(filter(None, started), default=NOTHING), max(filter(None, ended), default="not ended yet")
     return f"{_moment(first)} to {_moment(last)}"
 
@@ -98,14 +102,14 @@ def code_version(folder: Path | None = None) -> str:
     return f"{version}, commit {commit[:12]}{', with changes that are not committed' if changed else ''}"
 
 
-def where(group: Sequence[CellRecord], everything: Sequence[CellRecord]) -> str:
+def where(group: Sequence[PageCell], everything: Sequence[PageCell]) -> str:
     """Return in few words which of the cells `everything` those of `group` are: by task, variant or method if one
     of these tells them apart from the others, else by name."""
     chosen = {cell.name for cell in group}
     others = [cell for cell in everything if cell.name not in chosen]
     if not others:
         return ALL_CELLS
-    keys: dict[str, Callable[[CellRecord], str]] = {
+    keys: dict[str, Callable[[PageCell], str]] = {
         "tasks": lambda cell: cell.task,
         "methods": lambda cell: cell.method,
         "variants": lambda cell: cell.variant,
@@ -116,23 +120,23 @@ def where(group: Sequence[CellRecord], everything: Sequence[CellRecord]) -> str:
     return listed(sorted(chosen), most=2)
 
 
-def _setting_rows(cells: Sequence[CellRecord], part: str) -> Iterable[tuple[str, ...]]:
+def _setting_rows(cells: Sequence[PageCell], part: str) -> Iterable[tuple[str, ...]]:
     """Yield setting, value, source and cells; a setting is missing from cells that are older than it."""
-    settings = dict.fromkeys(name for cell in cells for name in cell.content["config"][part])
+    settings = dict.fromkeys(name for cell in cells for name in cell.record.config.parts[part])
     for name in settings:
-        having = [cell for cell in cells if name in cell.content["config"][part]]
+        having = [cell for cell in cells if name in cell.record.config.parts[part]]
 
-        def entry(cell: CellRecord, name: str = name) -> tuple[str, str]:
-            setting = cell.content["config"][part][name]
-            return _shown(setting["value"]), str(setting["source"])
+        def entry(cell: PageCell, name: str = name) -> tuple[str, str]:
+            value, source = cell.record.config.parts[part][name]
+            return _shown(value), source
 
         for (value, source), group in _grouped(having, entry):
             yield name, value, source, where(group, cells)
 
 
-def _grouped(cells: Sequence[CellRecord], key: Callable[[CellRecord], Any]) -> list[tuple[Any, list[CellRecord]]]:
+def _grouped(cells: Sequence[PageCell], key: Callable[[PageCell], Any]) -> list[tuple[Any, list[PageCell]]]:
     """Return the cells by what `key` gives, in the order in which that first occurs."""
-    groups: dict[Any, list[CellRecord]] = {}
+    groups: dict[Any, list[PageCell]] = {}
     for cell in cells:
         groups.setdefault(key(cell), []).append(cell)
     return list(groups.items())
@@ -142,8 +146,8 @@ def _shown(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def _median(timings: Sequence[dict[str, Any]], name: str) -> str:
-    known = [float(entry[name]) for entry in timings if entry.get(name) is not None]
+def _median(seconds: Iterable[float | None]) -> str:
+    known = [value for value in seconds if value is not None]
     return duration(median(known)) if known else NOTHING
 
 

@@ -1,1 +1,9 @@
-"""What a study is."""
+"""What a study is; everything that a new study needs is imported from here.
+
+`experiment.py` is what one figure needs, `study.py` the study itself, `reproduce.py` runs it.
+"""
+
+from codesign_bench.study.experiment import Experiment, Grid, Measure, stages_of
+from codesign_bench.study.study import DEFAULT_STUDY, Study, load_study, study_names
+
+__all__ = ["DEFAULT_STUDY", "Experiment", "Grid", "Measure", "Study", "load_study", "stages_of", "study_names"]

@@ -11,35 +11,19 @@ import signal
 import sys
 import threading
 import traceback
-from dataclasses import asdict
-from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any
 
 import filelock
 
-from codesign_bench.cell.cell import Cell
-from codesign_bench.config.resolve import ResolvedConfig, differences
+from codesign_bench.cell.cell import Cell, ResolvedCell, resolve_cell
+from codesign_bench.config.resolve import differences
 from codesign_bench.errors import UserError
 from codesign_bench.machine import host_facts, package_versions
-from codesign_bench.method import load_method
 from codesign_bench.plugins import import_modules
 from codesign_bench.processes import EXIT_ORPHANED
 from codesign_bench.storage.files import remove_partial_files
-from codesign_bench.storage.results import (
-    CHECKPOINT_FILE,
-    DONE,
-    FAILED,
-    LABEL_COLUMN,
-    LOCK_FILE,
-    LOG_FILE,
-    PROGRESS_FILE,
-    RUNNING,
-    SCHEMA,
-    cell_lock,
-    read_cell,
-    write_cell,
-)
+from codesign_bench.storage.layout import CHECKPOINT_FILE, LOCK_FILE, LOG_FILE, PROGRESS_FILE, cell_lock
+from codesign_bench.storage.records import DONE, FAILED, CellRecord, Failure, Timings, now
 from codesign_bench.sweep.training import CellRun
 
 EXIT_DONE, EXIT_FAILED, EXIT_REFUSED, EXIT_BUSY = 0, 1, 2, 75
@@ -65,40 +49,40 @@ def main(arguments: list[str] | None = None) -> int:
 
 def run_locked(cell: Cell, folder: Path, *, retry: bool) -> int:
     """Run `cell` as the holder of its lock, unless another process was quicker; return the exit code."""
-    before = read_cell(folder)
-    if before is not None and before["status"] == DONE:
+    before = CellRecord.read(folder)
+    if before is not None and before.status == DONE:
         return EXIT_DONE
-    if before is not None and before["status"] == FAILED and not retry:
+    if before is not None and before.status == FAILED and not retry:
         return EXIT_FAILED
     import_modules([])
-    config = cell.config()
-    if before is not None and (different := differences(before["config"], config)):
+    resolved = resolve_cell(cell)
+    if before is not None and (different := differences(before.config, resolved.config)):
         print(f"another configuration: {'; '.join(different)}", file=sys.stderr)
         return EXIT_REFUSED
     remove_partial_files(folder)
     pin_threads()
-    content = describe(cell, config, before)
-    write_cell(folder, content)
-    return _run_and_record(cell, config, folder, content)
+    record = describe(resolved, before)
+    record.write(folder)
+    return _run_and_record(resolved, folder, record)
 
 
-def describe(cell: Cell, config: ResolvedConfig, before: dict[str, Any] | None) -> dict[str, Any]:
-    """Return the content of the cell file of a running cell; `before` is what an interrupted run left."""
-    started = before["timings"]["started"] if before is not None else _now()
-    return {
-        "schema": SCHEMA,
-        "status": RUNNING,
-        **{name: value for name, value in asdict(cell).items() if name not in ("steps", "overrides")},
-        "variant": cell.variant,
-        LABEL_COLUMN: load_method(cell.method).label,
-        "env_steps": before["env_steps"] if before is not None else 0,
-        "config": config.as_json(),
-        "versions": package_versions(),
-        "host": host_facts(config.run.threads),
-        "pid": os.getpid(),
-        "timings": {"started": started, "ended": None, "train_s": None, "evaluate_s": None, "wall_s": None},
-        "failure": None,
-    }
+def describe(resolved: ResolvedCell, before: CellRecord | None) -> CellRecord:
+    """Return the record of a cell that runs now; `before` is what an interrupted run left."""
+    cell, config = resolved.cell, resolved.config
+    return CellRecord(
+        task=cell.task,
+        method=cell.method,
+        variant=cell.variant,
+        seed=cell.seed,
+        profile=cell.profile,
+        label=resolved.method_class.label,
+        env_steps=0 if before is None else before.env_steps,
+        config=config.stored(),
+        versions=package_versions(),
+        host=host_facts(config.run.threads),
+        pid=os.getpid(),
+        timings=Timings(started=now() if before is None else before.timings.started),
+    )
 
 
 def pin_threads() -> None:
@@ -110,35 +94,20 @@ def pin_threads() -> None:
         sys.modules["torch"].set_num_threads(1)
 
 
-def failure(message: str, trace: str) -> dict[str, str]:
-    """Return what a cell file says of a failure: one line, and the traceback or the end of the output."""
-    return {"message": message, "traceback": trace}
-
-
-def end(folder: Path, content: dict[str, Any], status: str, **changes: Any) -> None:
-    """Write the cell file of a cell that has ended."""
-    timings = {**content["timings"], **changes.pop("timings", {}), "ended": _now()}
-    write_cell(folder, {**content, **changes, "status": status, "timings": timings})
-
-
-def _run_and_record(cell: Cell, config: ResolvedConfig, folder: Path, content: dict[str, Any]) -> int:
+def _run_and_record(resolved: ResolvedCell, folder: Path, record: CellRecord) -> int:
     run: CellRun | None = None
     try:
-        run = CellRun(cell, config, folder)
-        finished = run.finish()
+        run = CellRun(resolved, folder)
+        run.finish()
     except Exception as error:
         message = str(error) if isinstance(error, UserError) else traceback.format_exception_only(error)[-1].strip()
         reached = {} if run is None else {"env_steps": run.progress.env_steps, "timings": run.timings()}
-        end(folder, content, FAILED, failure=failure(message, traceback.format_exc()), **reached)
+        record.ended(FAILED, failure=Failure(message, traceback.format_exc()), **reached).write(folder)
         return EXIT_FAILED
-    end(folder, content, DONE, env_steps=finished.env_steps, timings=finished.timings)
+    record.ended(DONE, env_steps=run.progress.env_steps, timings=run.timings()).write(folder)
     for name in (CHECKPOINT_FILE, PROGRESS_FILE, LOG_FILE, LOCK_FILE):
         (folder / name).unlink(missing_ok=True)
     return EXIT_DONE
-
-
-def _now() -> str:
-    return datetime.now(timezone.utc).isoformat(timespec="seconds")
 
 
 def _end_with_parent() -> None:

@@ -15,7 +15,7 @@ from rich.table import Table
 
 from codesign_bench.cell.cell import Cell
 from codesign_bench.console import duration, number
-from codesign_bench.storage.results import PROGRESS_FILE
+from codesign_bench.storage.layout import PROGRESS_FILE
 
 POLL_SECONDS = 1.0
 LINE_SECONDS = 10.0

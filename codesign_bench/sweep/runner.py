@@ -7,26 +7,19 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 from rich.console import Console
 
-from codesign_bench.cell.cell import Cell
-from codesign_bench.config.resolve import ResolvedConfig, differences
+from codesign_bench.cell.cell import Cell, ResolvedCell
+from codesign_bench.config.resolve import differences
+from codesign_bench.console import Log, printer
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores
 from codesign_bench.registry import IMPORTS_VARIABLE
 from codesign_bench.storage.checkpoint import load_checkpoint
-from codesign_bench.storage.results import (
-    CHECKPOINT_FILE,
-    CURVE_FILE,
-    DONE,
-    FAILED,
-    is_locked,
-    open_folder,
-    read_cell,
-)
+from codesign_bench.storage.layout import CHECKPOINT_FILE, CURVE_FILE, is_locked, open_folder
+from codesign_bench.storage.records import DONE, FAILED, CellRecord
 from codesign_bench.sweep.backends import Backend, WorkersDied, make_backend
 from codesign_bench.sweep.progress import ProgressDisplay
 from codesign_bench.sweep.workers import BUSY, Job, Outcome
@@ -44,28 +37,29 @@ class Plan:
     done: list[Cell]
     failed: dict[Cell, str]
     """Cells that failed earlier and are not tried again, with their message."""
-    pending: list[Cell]
-    configs: dict[Cell, ResolvedConfig]
+    pending: list[ResolvedCell]
 
 
-def make_plan(cells: Sequence[Cell], out: Path, *, retry_failed: bool = False) -> Plan:
+def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = False) -> Plan:
     """Sort `cells` by what is left to do in `out`, before anything runs.
 
     Raises:
-        UserError: a bad configuration, a cell of another configuration, a damaged cell file or checkpoint.
+        UserError: a cell of another configuration, a damaged cell file or checkpoint.
     """
-    plan = Plan([], {}, [], {cell: cell.config() for cell in cells})
-    contents = {cell: read_cell(cell.folder(out)) for cell in cells}
-    _refuse_other_configurations(plan.configs, contents, out)
-    _refuse_without_pretrained(cells, out)
-    for cell, content in contents.items():
-        if content is not None and content["status"] == DONE:
+    plan = Plan([], {}, [])
+    records = {resolved.cell: CellRecord.read(resolved.cell.folder(out)) for resolved in cells}
+    _refuse_other_configurations(cells, records, out)
+    _refuse_without_pretrained([resolved.cell for resolved in cells], out)
+    for resolved in cells:
+        cell = resolved.cell
+        record = records[cell]
+        if record is not None and record.status == DONE:
             plan.done.append(cell)
-        elif content is not None and content["status"] == FAILED and not retry_failed:
-            plan.failed[cell] = content["failure"]["message"]
+        elif record is not None and record.failure is not None and not retry_failed:
+            plan.failed[cell] = record.failure.message
         else:
             load_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is refused here, not in the middle
-            plan.pending.append(cell)
+            plan.pending.append(resolved)
     return plan
 
 
@@ -88,7 +82,7 @@ def split_cores(cores: int, cells: int, threads: int, jobs: int | None) -> tuple
 
 
 def run_sweep(
-    cells: Sequence[Cell],
+    cells: Sequence[ResolvedCell],
     out: Path,
     *,
     console: Console,
@@ -105,17 +99,17 @@ def run_sweep(
     """
     open_folder(out)
     plan = make_plan(cells, out, retry_failed=retry_failed)
-    threads = max((config.run.threads for config in plan.configs.values()), default=1)
+    threads = max((resolved.config.run.threads for resolved in cells), default=1)
     used_jobs, split = split_cores(available_cores(), len(plan.pending), threads, jobs)
     chosen = make_backend(backend, used_jobs, scheduler)
-    say = _printer(console)
+    say = printer(console)
     say(f"{len(cells)} cells, {len(plan.done)} of them done before; results in {out}")
     failures = dict(plan.failed)
     if plan.pending:
         say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
         imported = os.environ.get(IMPORTS_VARIABLE, "")
-        queue = [Job(cell, str(out), retry_failed, imported) for cell in plan.pending]
-        budgets = {cell: plan.configs[cell].run.steps for cell in plan.pending}
+        queue = [Job(resolved.cell, str(out), retry_failed, imported) for resolved in plan.pending]
+        budgets = {resolved.cell: resolved.config.run.steps for resolved in plan.pending}
         with chosen as workers, ProgressDisplay(console, out, budgets) as display:
             failures |= _run_queue(queue, workers, display)
     return _conclude(say, len(cells), failures, plan.failed)
@@ -165,34 +159,33 @@ def _last_row(cell: Cell, out: Path) -> str:
 
 
 def _refuse_other_configurations(
-    configs: dict[Cell, ResolvedConfig], contents: dict[Cell, dict[str, Any] | None], out: Path
+    cells: Sequence[ResolvedCell], records: dict[Cell, CellRecord | None], out: Path
 ) -> None:
     refused = [
-        (cell, different)
-        for cell, content in contents.items()
-        if content is not None and (different := differences(content["config"], configs[cell]))
+        (resolved.cell, different)
+        for resolved in cells
+        if (record := records[resolved.cell]) is not None and (different := differences(record.config, resolved.config))
     ]
     if refused:
         cell, different = refused[0]
         shown = "; ".join(different[:6]) + (f"; and {len(different) - 6} more" if len(different) > 6 else "")
-        others = f" (and {len(refused) - 1} cells more)" if len(refused) > 1 else ""
+        others = f" (and {len(refused) - 1} more cells)" if len(refused) > 1 else ""
         raise UserError(f"{cell.folder(out)}{others} was run with another configuration: {shown}\nchoose another --out")
 
 
 def _refuse_without_pretrained(cells: Sequence[Cell], out: Path) -> None:
     for cell in cells:
-        if cell.finetune is not None:
-            before = cell.pretrained()
-            content = read_cell(before.folder(out))
-            if content is None or content["status"] != DONE:
+        if (before := cell.pretrained) is not None:
+            record = CellRecord.read(before.folder(out))
+            if record is None or record.status != DONE:
                 raise UserError(
-                    f"--finetune: {cell.name} goes on from {before.name}, which is not done in {out}\nrun it first: "
+                    f"{cell.name} starts from {before.name}, which is not done in {out}\nrun it first: "
                     f"codesign-bench run --method {cell.method} --task {cell.task} --seeds {cell.seed}-{cell.seed} "
                     f"--profile {cell.profile} --out {out}, with the same --set if any"
                 )
 
 
-def _conclude(say: Any, cells: int, failures: dict[Cell, str], earlier: dict[Cell, str]) -> int:
+def _conclude(say: Log, cells: int, failures: dict[Cell, str], earlier: dict[Cell, str]) -> int:
     for cell, message in earlier.items():
         say(f"failed earlier  {cell.name}  {_one_line(message)}")
     if not failures:
@@ -201,10 +194,6 @@ def _conclude(say: Any, cells: int, failures: dict[Cell, str], earlier: dict[Cel
     hint = "; --retry-failed tries them again" if failures else ""
     say(f"{len(failures)} of {cells} cells failed; their cell.json holds the traceback{hint}")
     return EXIT_SOME_FAILED
-
-
-def _printer(console: Console) -> Any:
-    return lambda line: console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
 def _one_line(text: str) -> str:

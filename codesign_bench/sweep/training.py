@@ -7,19 +7,17 @@ from __future__ import annotations
 
 import os
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from codesign_bench.cell.cell import Cell
-from codesign_bench.config.resolve import ResolvedConfig
+from codesign_bench.cell.cell import Cell, ResolvedCell
 from codesign_bench.evaluation.evaluate import Evaluation, evaluate, rows
-from codesign_bench.method import BatchReport, Method, load_method
+from codesign_bench.method import BatchReport, Method
 from codesign_bench.seeding import Streams
+from codesign_bench.storage.cells import open_cell
 from codesign_bench.storage.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
 from codesign_bench.storage.files import write_json
-from codesign_bench.storage.policies import policy_tensors, save_policy
-from codesign_bench.storage.results import (
+from codesign_bench.storage.layout import (
     CHECKPOINT_FILE,
     CURVE_COLUMNS,
     CURVE_FILE,
@@ -28,6 +26,8 @@ from codesign_bench.storage.results import (
     PROGRESS_FILE,
     write_rows,
 )
+from codesign_bench.storage.policies import policy_tensors, save_policy
+from codesign_bench.storage.records import Timings
 
 CHECKPOINT_SECONDS_VARIABLE = "CODESIGN_BENCH_CHECKPOINT_SECONDS"
 """Environment variable: seconds between checkpoints (0 is after every batch); evaluations always make one."""
@@ -35,22 +35,15 @@ CHECKPOINT_SECONDS = 20.0
 PROGRESS_SECONDS = 1.0
 
 
-@dataclass(frozen=True)
-class Finished:
-    """What a finished cell took."""
-
-    env_steps: int
-    timings: dict[str, float]
-
-
 class CellRun:
     """One cell on its way; `finish` runs what is left of it."""
 
-    def __init__(self, cell: Cell, config: ResolvedConfig, folder: Path) -> None:
-        self.cell, self.config, self.folder = cell, config, folder
-        self.problem = cell.problem(config)
+    def __init__(self, resolved: ResolvedCell, folder: Path) -> None:
+        cell, config = self.cell, self.config = resolved.cell, resolved.config
+        self.folder = folder
+        self.problem = resolved.problem()
         self.streams = Streams(cell.seed)
-        self.method: Method[Any] = load_method(cell.method)(self.problem, config.method, self.streams)
+        self.method: Method[Any] = resolved.method_class(self.problem, config.method, self.streams)
         self.method.use_cores(config.run.threads)
         self.method.use_device(config.run.device)
         checkpoint = load_checkpoint(folder / CHECKPOINT_FILE)
@@ -58,8 +51,8 @@ class CellRun:
         if checkpoint is not None:
             self.method.load_state(checkpoint.state)
             self.streams.load_state(checkpoint.streams)
-        elif cell.finetune is not None:
-            self.method.start_from(policy_tensors(cell.pretrained_folder(folder)))
+        elif (before := cell.pretrained) is not None:
+            self.method.start_from(policy_tensors(open_cell(before.folder(_results(cell, folder)))))
         self._interval = float(os.environ.get(CHECKPOINT_SECONDS_VARIABLE, CHECKPOINT_SECONDS))
         self._started = self._saved = time.monotonic()
         self._reported = float("-inf")
@@ -67,7 +60,7 @@ class CellRun:
         self._earlier_steps = self.progress.env_steps
         self._last_evaluation: Evaluation | None = None
 
-    def finish(self) -> Finished:
+    def finish(self) -> None:
         """Train to the end of the budget and write everything but the cell file."""
         steps = self.config.run.steps
         self._report("training")
@@ -81,12 +74,11 @@ class CellRun:
                 self._save()
             self._report("training")
         self._write_final()
-        return Finished(self.progress.env_steps, self.timings())
 
-    def timings(self) -> dict[str, float]:
+    def timings(self) -> Timings:
         """Return seconds of training, of evaluation, and altogether, interruptions left out."""
         progress = self.progress
-        return {"train_s": progress.train_s, "evaluate_s": progress.evaluate_s, "wall_s": self._wall_s()}
+        return Timings(train_s=progress.train_s, evaluate_s=progress.evaluate_s, wall_s=self._wall_s())
 
     def _train(self, remaining_steps: int) -> None:
         start = time.monotonic()
@@ -157,7 +149,7 @@ class CellRun:
         # A cell killed after its last checkpoint comes here with no evaluation at hand.
         evaluation = self._last_evaluation or self._judge()
         self._write_curve()
-        write_rows(self.folder / EVALUATION_FILE, list(rows(task, evaluation, self.cell.cutout)))
+        write_rows(self.folder / EVALUATION_FILE, list(rows(task, evaluation, self.problem.cutout)))
         save_policy(self.folder, policy, {"task": self.cell.task, "method": self.cell.method})
 
     def _report(self, phase: str) -> None:
@@ -178,3 +170,8 @@ class CellRun:
             "success_rate": last.get("success_rate"),
         }
         write_json(self.folder / PROGRESS_FILE, content, durable=False)
+
+
+def _results(cell: Cell, folder: Path) -> Path:
+    """Return the results folder below which `folder` holds the results of `cell`."""
+    return folder.parents[len(Path(cell.name).parts) - 1]

@@ -17,16 +17,8 @@ from codesign_bench.cell.cell import Cell
 from codesign_bench.errors import UserError
 from codesign_bench.processes import end_with, thread_environment
 from codesign_bench.registry import IMPORTS_VARIABLE
-from codesign_bench.storage.results import (
-    DONE,
-    FAILED,
-    LOG_FILE,
-    PROGRESS_FILE,
-    RUNNING,
-    cell_lock,
-    is_locked,
-    read_cell,
-)
+from codesign_bench.storage.layout import LOG_FILE, PROGRESS_FILE, cell_lock, is_locked
+from codesign_bench.storage.records import DONE, FAILED, RUNNING, CellRecord, Failure
 from codesign_bench.sweep import cell_process
 
 BUSY = "busy"
@@ -106,8 +98,8 @@ def _run_process(job: Job, folder: Path) -> int:
 
 
 def _recorded_failure(folder: Path) -> str:
-    content = read_cell(folder)
-    return content["failure"]["message"] if content is not None and content["status"] == FAILED else ""
+    record = CellRecord.read(folder)
+    return record.failure.message if record is not None and record.failure is not None else ""
 
 
 def _record_death(folder: Path, code: int) -> str:
@@ -117,11 +109,11 @@ def _record_death(folder: Path, code: int) -> str:
     message = describe_exit(code)
     try:
         with cell_lock(folder).acquire(timeout=0):
-            content = read_cell(folder)
-            if content is not None and content["status"] == RUNNING:
+            record = CellRecord.read(folder)
+            if record is not None and record.status == RUNNING:
                 trace = _end_of_log(folder) or message
-                cell_process.end(folder, content, FAILED, failure=cell_process.failure(message, trace))
-            elif content is None:
+                record.ended(FAILED, failure=Failure(message, trace)).write(folder)
+            elif record is None:
                 message = f"{message}: {_end_of_log(folder).strip()}"
     except (filelock.Timeout, UserError) as error:
         return f"{message} ({error})"

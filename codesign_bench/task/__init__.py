@@ -10,7 +10,7 @@ from codesign_bench.task.loading import deployable_tasks, deployment_of, load_ta
 from codesign_bench.task.scene import OURS, Constant, Given, constants
 from codesign_bench.task.simulator import Physics, Simulator, Soundness
 from codesign_bench.task.spaces import Booleans, Box, Floats, Frame, Layout, Observed, Quantity, Singles, Slots, Span
-from codesign_bench.task.task import EVALUATION_SEED, Task
+from codesign_bench.task.task import EVALUATION_SEED, ByProfile, Task
 from codesign_bench.task.tool import BoxPart, PlanarPart, ToolGraph, ToolPart
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "Booleans",
     "Box",
     "BoxPart",
+    "ByProfile",
     "Constant",
     "Floats",
     "Frame",

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -25,6 +25,10 @@ from codesign_bench.task.tool import ToolGraph, ToolPart
 NOTHING_NAMED: Mapping[str, Any] = MappingProxyType({})
 EVALUATION_SEED = 20231106
 """Seed of every task's fixed evaluation instances; training never uses it (ours)."""
+
+
+ByProfile: TypeAlias = Mapping[str, Mapping[str, Any]]
+"""Name of a profile -> name of a run setting -> value."""
 
 
 class Task(ABC):
@@ -68,6 +72,8 @@ class Task(ABC):
     """What `Simulator.outcome` measures: how far the task got, whatever the reward."""
     soundness: ClassVar[Soundness | None] = None
     """What the task promises of its physics; built-in tasks all do."""
+    run_settings: ClassVar[ByProfile] = {}
+    """Profile -> run settings that this task wants otherwise, e.g. a larger budget."""
     num_evaluation_instances: ClassVar[int] = 128
     max_slots: ClassVar[int] = 1_000
     """Most slots to ask of one simulator when many episodes are to be played; a world may need much memory."""

@@ -13,8 +13,8 @@ from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, Lacking
 
-OWN = deployment.own_instance_solved("fetch_cube", "gnn_ppo")
-GRID = deployment.no_tool_solves_the_grid("fetch_cube", "gnn_ppo")
+OWN = deployment.own_instance_solved("fetch_cube", "gnn_ppo", tools=4, trials=5)
+GRID = deployment.no_tool_solves_the_grid("fetch_cube", "gnn_ppo", tools=4, starts=12)
 
 
 def own(*solved: int, trials: int = 5) -> Evidence:

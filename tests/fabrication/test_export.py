@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from builders import VERSION_0_1_0
 from PIL import Image
 
 from codesign_bench import load_task, task_names
@@ -18,10 +19,9 @@ from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.fabrication.export import Order, export
 from codesign_bench.task.behaviours import RandomBehaviour
 
-REFERENCE = Path(__file__).resolve().parents[2] / "results" / "reference"
-PUSH = REFERENCE / "push" / "gnn_ppo" / "default" / "seed-00"
-ONE_TOOL = REFERENCE / "push" / "cma_rl" / "default" / "seed-00"
-FETCH = REFERENCE / "fetch_cube" / "gnn_ppo" / "default" / "seed-00"
+PUSH = VERSION_0_1_0 / "push" / "gnn_ppo" / "default" / "seed-00"
+ONE_TOOL = VERSION_0_1_0 / "push" / "cma_rl" / "default" / "seed-00"
+FETCH = VERSION_0_1_0 / "fetch_cube" / "gnn_ppo" / "default" / "seed-00"
 
 trimesh = pytest.importorskip("trimesh")
 

@@ -15,17 +15,15 @@ import numpy as np
 import pytest
 import torch
 
-from codesign_bench.config.profiles import PROFILES
+from codesign_bench.config.resolve import resolve
 from codesign_bench.method import Method, Policy, load_method, method_names
 from codesign_bench.storage.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
-from codesign_bench.studies.corl2023.learners import LEARNERS
-from codesign_bench.task import Singles, Task
+from codesign_bench.task import Singles, Task, task_names
 from codesign_bench.task.episodes import Episodes
 
 MakeMethod = Callable[..., Method[Any]]
 EVERY_METHOD = pytest.mark.parametrize("name", method_names())
 BUDGET = 10_000
-TASKS = (*LEARNERS, "push", "catch_balls", "scoop", "fetch_cube", "lift_cup", "scoop_3d", "a_task_of_somebody_else")
 
 
 def observations(task: Task, count: int = 6) -> tuple[Singles, Singles]:
@@ -168,17 +166,14 @@ def test_an_interrupted_method_goes_on_identically_through_a_file(
     assert_same_state(method, restored)
 
 
-@EVERY_METHOD
-@pytest.mark.parametrize("profile", PROFILES)
 def test_every_profile_makes_a_valid_configuration_for_every_task(name: str, profile: str) -> None:
     method_class = load_method(name)
-    known = {field.name for field in fields(method_class.config_class)}
-    for task_name in dict.fromkeys(TASKS):
-        settings = method_class.profile(profile, task_name)
-        assert set(settings) <= known
-        assert all(source for _, source in settings.values())
-        config = method_class.config_class(**{key: value for key, (value, _) in settings.items()})
-        assert all(getattr(config, key) == value for key, (value, _) in settings.items())
+    for task_name in task_names():
+        parts = resolve(method_class, task_name, profile).stored().parts
+        assert set(parts["method"]) == {field.name for field in fields(method_class.config_class)}
+        assert all(source for settings in parts.values() for _, source in settings.values())
+    assert method_class.profile(profile, "a_task_of_somebody_else").keys() <= parts["method"].keys()
+    assert method_class.profile("a profile of somebody else", "push").keys() <= parts["method"].keys()
 
 
 @EVERY_METHOD

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import torch
 
-from codesign_bench.config.profiles import PROFILES
+from codesign_bench.config.profiles import profiles
 from codesign_bench.config.resolve import resolve
 from codesign_bench.learning.actor import Actor
 from codesign_bench.method import Method, load_method
@@ -85,7 +85,7 @@ def test_the_paper_trains_both_phases_jointly(push: Task, name: str) -> None:
     assert resolve(load_method(name), push.name, "paper").method.design_credit == "joint"
 
 
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("profile", profiles())
 def test_goal_conditioned_methods_share_optimiser_settings_unless_told(push: Task, profile: str) -> None:
     ours, single = (resolve(load_method(name), push.name, profile).method for name in ("gnn_ppo", "hwasp_minimal"))
     if profile == "paper":  # "The same hyperparameters" (the paper's appendix on the baselines).
@@ -98,7 +98,7 @@ def count(parameters: Any) -> int:
     return sum(parameter.numel() for parameter in parameters if parameter.requires_grad)
 
 
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("profile", profiles())
 @pytest.mark.parametrize("task_name", task_names())
 def test_the_shared_architecture_has_at_least_as_many_parameters(task_name: str, profile: str) -> None:
     task, policies, wholes = load_task(task_name), [], []

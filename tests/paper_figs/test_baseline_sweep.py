@@ -51,7 +51,7 @@ def test_every_parameter_has_a_panel_with_every_setting() -> None:
 
 
 def test_a_table_without_rows_or_columns_is_refused() -> None:
-    with pytest.raises(UserError, match="every row"):
+    with pytest.raises(UserError, match="have no rows"):
         figure.data(table().iloc[:0])
-    with pytest.raises(UserError, match="lacks kept"):
+    with pytest.raises(UserError, match="lack the column kept"):
         figure.data(table().drop(columns="kept"))

@@ -87,7 +87,7 @@ def test_without_a_grid_the_table_stands_alone(frame: pd.DataFrame) -> None:
 
 
 def test_trials_that_lack_a_column_are_refused(frame: pd.DataFrame) -> None:
-    with pytest.raises(UserError, match="lack near"):
+    with pytest.raises(UserError, match="lack the column near"):
         deployment.data(frame.drop(columns="near"))
-    with pytest.raises(UserError, match="every row"):
+    with pytest.raises(UserError, match="have no rows"):
         deployment.data(frame.iloc[:0])

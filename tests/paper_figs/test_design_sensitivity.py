@@ -56,7 +56,7 @@ def test_a_single_task_fits_a_column() -> None:
 
 
 def test_a_table_without_rows_or_columns_is_refused() -> None:
-    with pytest.raises(UserError, match="every row"):
+    with pytest.raises(UserError, match="have no rows"):
         figure.data(table().iloc[:0])
-    with pytest.raises(UserError, match="lacks own"):
+    with pytest.raises(UserError, match="lack the column own"):
         figure.data(table().drop(columns="own"))

@@ -93,5 +93,5 @@ def test_the_same_results_give_the_same_intervals() -> None:
 
 
 def test_without_curves_the_way_to_them_is_told() -> None:
-    with pytest.raises(UserError, match="final_results: no evaluated cell"):
+    with pytest.raises(UserError, match="no evaluated cell"):
         figure.data(cells("gnn_ppo", [1.0], variant="alpha-0.30"))

@@ -23,9 +23,12 @@ def results(seeds: int = 3) -> pd.DataFrame:
     for seed, start, (kind, slope) in product(range(seeds), (1, 2), (("finetune", 2.0), ("scratch", 1.0))):
         for point in range(3):
             value = slope * point + 0.5 * seed + 10.0 * (start - 1)
-            rows.append(("fetch_cube", "gnn_ppo", f"{kind}-{start}", seed, 1_000 * point, value, 40 * point))
-    rows.append(("fetch_cube", "gnn_ppo", "default", 0, 0, 99.0, 0))
-    columns = ["task", "method", "variant", "seed", "env_steps", "return_mean", "gradient_steps"]
+            axes = {"finetune": np.nan, "scratch": np.nan, kind: float(start)}
+            rows.append(
+                ("fetch_cube", "gnn_ppo", f"{kind}-{start}", *axes.values(), seed, 1_000 * point, value, 40 * point)
+            )
+    rows.append(("fetch_cube", "gnn_ppo", "default", np.nan, np.nan, 0, 0, 99.0, 0))
+    columns = ["task", "method", "variant", "finetune", "scratch", "seed", "env_steps", "return_mean", "gradient_steps"]
     return pd.DataFrame(rows, columns=columns)
 
 
@@ -66,7 +69,7 @@ def test_where_seeds_have_ended_the_line_is_dotted() -> None:
 
 def test_results_without_such_cells_are_refused() -> None:
     frame = results()
-    with pytest.raises(UserError, match="reproduce fine_tuning"):
+    with pytest.raises(UserError, match="no cell of --finetune or --scratch"):
         figure.data(frame[frame["variant"] == "default"])
     with pytest.raises(UserError, match="gradient_steps"):
         figure.data(frame.drop(columns="gradient_steps"))

@@ -114,7 +114,7 @@ def test_every_task_has_its_row() -> None:
 
 
 def test_what_is_missing_is_named() -> None:
-    with pytest.raises(UserError, match="every row"):
+    with pytest.raises(UserError, match="have no rows"):
         figure.data(places(0.6).reindex(columns=figure.NEEDED).assign(kind="place"))
-    with pytest.raises(UserError, match="lack region"):
+    with pytest.raises(UserError, match="lack the column region"):
         figure.draw(evaluations(0.6, 3).drop(columns="region"))

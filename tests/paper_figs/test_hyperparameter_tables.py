@@ -80,7 +80,7 @@ def test_data_holds_every_row_with_its_printed_name() -> None:
 
 
 def test_what_is_missing_is_named() -> None:
-    with pytest.raises(UserError, match="every row"):
+    with pytest.raises(UserError, match="have no rows"):
         figure.data(settings().iloc[:0])
-    with pytest.raises(UserError, match="lack laptop_source"):
+    with pytest.raises(UserError, match="lack the column laptop_source"):
         figure.draw(settings().drop(columns="laptop_source"))

@@ -80,5 +80,5 @@ def test_the_kind_of_interval_is_written_on_the_figure() -> None:
 
 
 def test_results_without_a_default_cell_say_so() -> None:
-    with pytest.raises(UserError, match="learning_curves_iqm: no evaluated cell"):
+    with pytest.raises(UserError, match="no evaluated cell"):
         figure.draw(curves([1.0]).assign(variant="alpha-0.30"))

@@ -101,7 +101,7 @@ def test_other_variants_are_left_out_and_tables_hold_no_pictures() -> None:
     assert not {"picture", "alpha"} & set(table.columns)
     with pytest.raises(UserError, match="no finished cell of variant 'default'"):
         tools.data(frame[frame["variant"] != "default"])
-    with pytest.raises(UserError, match="lack the columns goal"):
+    with pytest.raises(UserError, match="lack the column goal"):
         tools.draw(frame.drop(columns="goal"))
 
 
@@ -120,7 +120,7 @@ def test_the_gallery_has_one_titled_picture_per_task_in_the_papers_order() -> No
 
 
 def test_a_gallery_without_pictures_is_refused() -> None:
-    with pytest.raises(UserError, match="every row"):
+    with pytest.raises(UserError, match="have no rows"):
         gallery.data(pd.DataFrame([scene("push")]).iloc[:0])
-    with pytest.raises(UserError, match="lack steps"):
+    with pytest.raises(UserError, match="lack the column steps"):
         gallery.draw(pd.DataFrame([scene("push")]).drop(columns="steps"))

@@ -57,7 +57,7 @@ def test_the_picture_shows_every_row() -> None:
 
 
 def test_records_without_rows_or_columns_are_refused() -> None:
-    with pytest.raises(UserError, match="every row"):
+    with pytest.raises(UserError, match="have no rows"):
         figure.data(cells().iloc[:0])
-    with pytest.raises(UserError, match="lack cpu"):
+    with pytest.raises(UserError, match="lack the column cpu"):
         figure.data(cells().drop(columns="cpu"))

@@ -70,7 +70,7 @@ def test_other_variants_are_left_out_and_missing_columns_named() -> None:
     for other in ("default", "cutout-0.40_alpha-0.30"):
         with pytest.raises(UserError, match="no finished cell with an alpha"):
             figure.data(frame.assign(variant=other))
-    with pytest.raises(UserError, match="lack the columns effort"):
+    with pytest.raises(UserError, match="lack the column effort"):
         figure.draw(frame.drop(columns="effort"))
 
 

@@ -7,7 +7,6 @@ goes on with three times the budget. Settings are judged by the return of CMA-ES
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -16,13 +15,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from joblib import Parallel, delayed
 
+from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.config.resolve import resolve
+from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.figures.source import Request
 from codesign_bench.method import Problem, load_method
 from codesign_bench.seeding import Streams, generator
-from codesign_bench.storage.files import write_bytes
-from codesign_bench.storage.results import open_folder
+from codesign_bench.storage.tables import read_table, write_table
 from codesign_bench.studies.corl2023.learners import CMA_ES_SWEEP, Swept
 from codesign_bench.task import load_task
 
@@ -70,7 +71,7 @@ def settings_of(count: int) -> list[dict[str, float]]:
     return [best, *(others[index] for index in order[: count - 1])]
 
 
-def sweep_baseline(results: Path, profile: str, say: Callable[[str], None]) -> pd.DataFrame:
+def sweep_baseline(results: Path, profile: str, log: Log) -> pd.DataFrame:
     """Search, unless `results` holds the table already; return the table, one row per setting and rung.
 
     Raises:
@@ -79,12 +80,13 @@ def sweep_baseline(results: Path, profile: str, say: Callable[[str], None]) -> p
     import pandas as pd
 
     path = results / FOLDER / f"{TASK}-{profile}.csv"
-    if path.exists():
-        return pd.read_csv(path)
-    plan, rows = PLANS[profile], list[dict[str, Any]]()
+    known = read_table(path)
+    if known is not None:
+        return known
+    plan, rows = PLANS.get(profile, PLANS[DEFAULT_PROFILE]), list[dict[str, Any]]()
     alive, budget, rung = settings_of(plan.settings), plan.budget, 0
     while len(alive) > 1:
-        say(f"{FOLDER}: {len(alive)} settings of {METHOD} with {budget:,} steps each on {TASK}")
+        log(f"{FOLDER}: {len(alive)} settings of {METHOD} with {budget:,} steps each on {TASK}")
         found = Parallel(n_jobs=os.cpu_count() or 1)(delayed(_judge)(setting, budget) for setting in alive)
         order = np.argsort([-value for _, value in found], kind="stable")
         keep = set(order[: len(alive) // REDUCTION].tolist())
@@ -103,34 +105,30 @@ def sweep_baseline(results: Path, profile: str, say: Callable[[str], None]) -> p
             )
         alive = [alive[index] for index in order if index in keep]
         budget, rung = budget * REDUCTION, rung + 1
-    open_folder(results)
-    path.parent.mkdir(exist_ok=True)
     table = pd.DataFrame(rows, columns=list(COLUMNS))
-    write_bytes(path, table.to_csv(index=False, lineterminator="\n").encode())
+    write_table(results, path, table)
     return table
 
 
-def load_sweep(results: Path) -> pd.DataFrame:
-    """Return the table of the most thorough sweep below `results`.
+def load_sweep(request: Request) -> pd.DataFrame:
+    """Return the table of the most thorough sweep below the results folder.
 
     Raises:
         UserError: there is none.
     """
-    import pandas as pd
-
     for profile in reversed(PLANS):
-        path = results / FOLDER / f"{TASK}-{profile}.csv"
-        if path.exists():
-            return pd.read_csv(path)
-    raise UserError(
-        f"no sweep in '{results}' yet; make one with: codesign-bench reproduce baseline_sweep --out {results}"
-    )
+        table = read_table(request.results / FOLDER / f"{TASK}-{profile}.csv")
+        if table is not None:
+            return table
+    raise UserError(f"no sweep in '{request.results}' yet")
 
 
 def _judge(setting: dict[str, float], budget: int) -> tuple[int, float]:
     """Train with one setting; return the steps taken and the final return."""
     method_class: Any = load_method(METHOD)
-    config = replace(resolve(method_class, TASK, "laptop").method, **{**setting, "popsize": int(setting["popsize"])})
+    config = replace(
+        resolve(method_class, TASK, DEFAULT_PROFILE).method, **{**setting, "popsize": int(setting["popsize"])}
+    )
     problem = Problem(load_task(TASK))
     method = method_class(problem, config, Streams(SEED))
     steps = 0

@@ -6,18 +6,14 @@ Sentences are ours, close to the paper's; figures are named by their LaTeX label
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import prod
 
 from codesign_bench.claims import comparison, deployment, fine_tuning, tools, tradeoff, zero_shot
 from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.statistics import run_command
+from codesign_bench.studies.corl2023.members import OURS, PRIOR, SEEDS, SHARED, STARTS, TASKS
 from codesign_bench.studies.corl2023.protocol import PROTOCOL
-from codesign_bench.studies.corl2023.scenes import SCENES
-
-OURS, SHARED = "gnn_ppo", "shared_arch"
-PRIOR = ("cma_rl", "hwasp_minimal", "cma_es")
-"""Prior methods and baselines; the ablation `SHARED` is not one of them."""
-TASKS = tuple(SCENES)
-SEEDS = {task: PROTOCOL.seeds_for(task) for task in TASKS}
+from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 
 EFFICIENCY = "Evaluating sample efficiency; fig:sample_efficiency"
 TOOLS = "Evaluating sample efficiency; fig:qualitative_tools"
@@ -32,9 +28,7 @@ LIFT = "lift_cup"
 CATCH = "catch_balls"
 FRACTIONS, ALPHAS = PROTOCOL.cutout_fractions, PROTOCOL.alphas
 FEW_SEEDS = PROTOCOL.seeds_generalisation
-
-OUTSIDE = ((FETCH, OURS),)
-"""Tasks and methods that are measured outside the training region."""
+TOOLS_ON_THE_ARM = len(REAL_ROBOT.fetch_cube_starts)
 
 
 def _listed(option: str, values: tuple[float, ...]) -> str:
@@ -43,7 +37,6 @@ def _listed(option: str, values: tuple[float, ...]) -> str:
 
 CUTOUTS = run_command(OURS, FETCH, FEW_SEEDS, _listed("cutout", FRACTIONS))
 TRADEOFFS = run_command(OURS, CATCH, FEW_SEEDS, _listed("alpha", ALPHAS))
-STARTS = tuple(range(1, len(PROTOCOL.fine_tuning_starts) + 1))
 FINE_TUNED = (
     run_command(OURS, FETCH, FEW_SEEDS),
     run_command(OURS, FETCH, FEW_SEEDS, _listed("finetune", STARTS)),
@@ -58,6 +51,7 @@ def _against(baseline: str, final: str, faster: str) -> Iterator[Claim]:
         f"across all tasks, {final} {baseline}",
         EFFICIENCY,
         comparison.better_across_tasks(TASKS, OURS, baseline, SEEDS),
+        TASKS,
     )
     for task in TASKS:
         yield Claim(
@@ -65,6 +59,7 @@ def _against(baseline: str, final: str, faster: str) -> Iterator[Claim]:
             f"on {task}, {final} {baseline}",
             EFFICIENCY,
             comparison.higher_final_return(task, OURS, baseline, SEEDS[task]),
+            (task,),
         )
     for task in TASKS:
         yield Claim(
@@ -72,6 +67,7 @@ def _against(baseline: str, final: str, faster: str) -> Iterator[Claim]:
             f"on {task}, {faster} {baseline}",
             EFFICIENCY,
             comparison.fewer_steps(task, OURS, baseline, SEEDS[task]),
+            (task,),
         )
 
 
@@ -96,6 +92,7 @@ CLAIMS: tuple[Claim, ...] = (
             f"on {task}, one learned designer makes different tools for different goals",
             TOOLS,
             tools.tools_vary(task, OURS, SEEDS[task]),
+            (task,),
         )
         for task in TASKS
     ),
@@ -105,6 +102,7 @@ CLAIMS: tuple[Claim, ...] = (
             f"no single tool solves all instances of {task}",
             ENVIRONMENTS,
             tools.no_single_tool(task),
+            (task,),
         )
         for task in TASKS
     ),
@@ -113,30 +111,35 @@ CLAIMS: tuple[Claim, ...] = (
         "with a very small cutout region, unseen starts of the cube are handled like seen ones",
         ZERO_SHOT,
         zero_shot.unseen_close(FETCH, OURS, min(FRACTIONS), CUTOUTS),
+        (FETCH,),
     ),
     Claim(
         "zero_shot.falls",
         "as the cutout region grows, the return on unseen starts falls",
         ZERO_SHOT,
         zero_shot.unseen_falls(FETCH, OURS, FRACTIONS, CUTOUTS),
+        (FETCH,),
     ),
     Claim(
         "zero_shot.gently",
         "as the cutout region grows, the return on unseen starts falls gently",
         ZERO_SHOT,
         zero_shot.unseen_falls_gently(FETCH, OURS, FRACTIONS, CUTOUTS),
+        (FETCH,),
     ),
     Claim(
         "zero_shot.portion",
         "even with the largest cutout region, a significant portion of unseen starts is solved",
         ZERO_SHOT,
         zero_shot.unseen_solved(FETCH, OURS, max(FRACTIONS), CUTOUTS),
+        (FETCH,),
     ),
     Claim(
         "zero_shot.outside",
         "policies solve starts of the cube even outside the training region",
         ZERO_SHOT,
         zero_shot.outside_solved(FETCH, OURS, run_command(OURS, FETCH, FEW_SEEDS)),
+        (FETCH,),
     ),
     *(
         Claim(
@@ -144,6 +147,7 @@ CLAIMS: tuple[Claim, ...] = (
             f"start {number} of the four outside the training region is not solved zero-shot",
             FINE_TUNING,
             fine_tuning.unsolved_before(FETCH, OURS, number, FINE_TUNED),
+            (FETCH,),
         )
         for number in STARTS
     ),
@@ -153,6 +157,7 @@ CLAIMS: tuple[Claim, ...] = (
             f"start {number} of the four outside the training region is solved after fine-tuning",
             FINE_TUNING,
             fine_tuning.solved_after(FETCH, OURS, number, FINE_TUNED),
+            (FETCH,),
         )
         for number in STARTS
     ),
@@ -162,6 +167,7 @@ CLAIMS: tuple[Claim, ...] = (
             f"on start {number} of the four, fine-tuning is more effective than learning from scratch",
             FINE_TUNING,
             fine_tuning.fine_tuning_wins(FETCH, OURS, number, FROM_SCRATCH),
+            (FETCH,),
         )
         for number in STARTS
     ),
@@ -170,31 +176,36 @@ CLAIMS: tuple[Claim, ...] = (
         "the ratio of design to control follows alpha",
         TRADEOFF,
         tradeoff.falls_with_alpha(CATCH, OURS, ALPHAS, tradeoff.RATIO, TRADEOFFS),
+        (CATCH,),
     ),
     Claim(
         "tradeoff.ratio_in_order",
         "the ratio of design to control follows alpha at each of its four values",
         TRADEOFF,
         tradeoff.ratio_in_order(CATCH, OURS, ALPHAS, TRADEOFFS),
+        (CATCH,),
     ),
     Claim(
         "tradeoff.material",
         "a larger alpha makes tools of less material",
         TRADEOFF,
         tradeoff.falls_with_alpha(CATCH, OURS, ALPHAS, tradeoff.MATERIAL, TRADEOFFS),
+        (CATCH,),
     ),
     Claim(
         "tradeoff.effort",
         "a smaller alpha, with its larger tools, needs less movement",
         TRADEOFF,
         tradeoff.rises_with_alpha(CATCH, OURS, ALPHAS, tradeoff.EFFORT, TRADEOFFS),
+        (CATCH,),
     ),
     *(
         Claim(
             f"deployment.own_instance.{task}",
             f"on an arm, policies succeed on the instance of {task} that their tool was designed for",
             REAL,
-            deployment.own_instance_solved(task, OURS),
+            deployment.own_instance_solved(task, OURS, tools=TOOLS_ON_THE_ARM, trials=REAL_ROBOT.trials),
+            (task,),
         )
         for task in (FETCH, LIFT)
     ),
@@ -202,6 +213,7 @@ CLAIMS: tuple[Claim, ...] = (
         "deployment.grid",
         "on an arm, no tool solves the whole grid of the cube's starts",
         REAL,
-        deployment.no_tool_solves_the_grid(FETCH, OURS),
+        deployment.no_tool_solves_the_grid(FETCH, OURS, tools=TOOLS_ON_THE_ARM, starts=prod(REAL_ROBOT.grid_shape)),
+        (FETCH,),
     ),
 )

@@ -6,9 +6,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from codesign_bench.config.resolve import METHOD, resolve
+from codesign_bench.config.resolve import resolve
 from codesign_bench.errors import UserError
+from codesign_bench.figures.source import Request, tasks_in
 from codesign_bench.method import load_method
+from codesign_bench.studies.corl2023.members import METHODS, TASKS
 from codesign_bench.studies.corl2023.scenes import SCENES
 
 if TYPE_CHECKING:
@@ -45,6 +47,16 @@ def hyperparameters(methods: Iterable[str], tasks: Iterable[str] = tuple(SCENES)
     return pd.DataFrame(rows)
 
 
+def hyperparameters_of_results(request: Request) -> pd.DataFrame:
+    """Return the settings of the paper's methods on those of its tasks that results have; if named, on all of them.
+
+    Raises:
+        UserError: the results hold none of the paper's tasks.
+    """
+    present = TASKS if request.named else tasks_in(request.results)
+    return hyperparameters(METHODS, [task for task in TASKS if task in present])
+
+
 def as_text(value: Any) -> str:
     """Return a value as the paper prints it: 2e-5, 0.01, 50000, True, (64, 64, 64)."""
     if isinstance(value, Sequence) and not isinstance(value, str):
@@ -64,10 +76,10 @@ def _scene_rows(task: str) -> Iterator[dict[str, str]]:
 
 
 def _method_rows(method: Any, task: str) -> Iterator[dict[str, str]]:
-    resolved = {profile: resolve(method, task, profile).as_json()[METHOD] for profile in PROFILES}
+    resolved = {profile: resolve(method, task, profile).stored().method for profile in PROFILES}
     for name in resolved[PROFILES[0]]:
         entries = {}
         for profile, values in resolved.items():
-            entries[profile] = as_text(values[name]["value"])
-            entries[f"{profile}_source"] = values[name]["source"]
+            entries[profile] = as_text(values[name].value)
+            entries[f"{profile}_source"] = values[name].source
         yield {"task": task, "method": method.name, "label": method.label, "name": name, **entries}

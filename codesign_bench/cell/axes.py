@@ -1,0 +1,168 @@
+"""What varying an axis means: which values it takes, and what it changes of the problem and of the configuration.
+
+A study adds an axis in its own file; see `Study.axes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, ClassVar
+
+from codesign_bench.cell.variant import Value, Variant
+from codesign_bench.config.run_settings import RunSettings
+from codesign_bench.config.values import parse_value
+from codesign_bench.errors import UserError, unknown_name
+from codesign_bench.method import Problem
+from codesign_bench.registry import load_attribute, names
+from codesign_bench.task import Task
+from codesign_bench.task.episodes import Tradeoff
+
+
+class Axis:
+    """One thing that cells may vary. A subclass or an instance says what that means; by default it changes nothing."""
+
+    name: ClassVar[str]
+    """Column of frames, part of the variant's name, option of `run`."""
+    kind: ClassVar[type] = float
+    """Type of its values: float, int or str."""
+    metavar: ClassVar[str] = "X"
+    help: ClassVar[str] = ""
+    """What the option does, in one line."""
+    exclusive: ClassVar[str] = ""
+    """Axes that share this word are never varied together; a grid has them one after the other."""
+
+    def check(self, value: Value, task: Task) -> None:
+        """Refuse a value that means nothing, or that `task` cannot have.
+
+        Raises:
+            UserError: naming the value.
+        """
+
+    def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
+        """Return what the cell's method is asked to learn."""
+        return problem
+
+    def overrides(self, value: Value) -> tuple[str, ...]:
+        """Return settings that the value stands for, in the form of `--set`."""
+        return ()
+
+    def run_overrides(self, run: RunSettings) -> Mapping[str, tuple[Any, str]]:
+        """Return run settings that a cell has whatever the value, unless --steps sets them: name -> (value, source)."""
+        return {}
+
+    def pretrained(self, variant: Variant) -> Variant | None:
+        """Return the variant from whose final policy a cell starts, or None: it starts from scratch."""
+        return None
+
+
+class Cutout(Axis):
+    """Holds the inner part of the training region out (paper, section 5.2)."""
+
+    name = "cutout"
+    metavar = "F"
+    help = "hold out the inner fraction F of the goal region from training"
+
+    def check(self, value: Value, task: Task) -> None:
+        """Refuse fractions outside (0, 1) and tasks without positions."""
+        if not 0.0 < float(value) < 1.0:
+            raise UserError(f"--cutout must be between 0 and 1 (both excluded), not {value:g}")
+        task.in_cutout(task.evaluation_instances()[:1], float(value))
+
+    def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
+        """Leave the cutout region out of training."""
+        return replace(problem, cutout=float(value))
+
+
+class Alpha(Axis):
+    """Adds the trade-off reward (paper, equation 1)."""
+
+    name = "alpha"
+    metavar = "A"
+    help = "add the trade-off reward with coefficient A"
+
+    def check(self, value: Value, task: Task) -> None:
+        """Refuse coefficients outside [0, 1]."""
+        if not 0.0 <= float(value) <= 1.0:
+            raise UserError(f"--alpha must be between 0 and 1, not {value:g}")
+
+    def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
+        """Add the trade-off reward."""
+        return replace(problem, tradeoff=Tradeoff(float(value), run.tradeoff_scale))
+
+
+class _OneInstance(Axis):
+    """Trains on one of the task's fine-tuning instances alone."""
+
+    kind = int
+    metavar = "N"
+    exclusive = "instance"
+
+    def check(self, value: Value, task: Task) -> None:
+        """Refuse numbers of instances that the task does not have."""
+        count = len(task.fine_tuning_instances())
+        if not 1 <= int(value) <= count:
+            raise UserError(f"--{self.name} {value}: task '{task.name}' has fine-tuning instances 1 to {count}")
+
+    def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
+        """Train and evaluate on the one instance."""
+        return replace(problem, instances=problem.task.fine_tuning_instances()[int(value) - 1 : int(value)])
+
+    def run_overrides(self, run: RunSettings) -> Mapping[str, tuple[Any, str]]:
+        """Return the smaller budget of one instance."""
+        return {"steps": (run.fine_tuning_steps, "fine_tuning_steps")}
+
+
+class Finetune(_OneInstance):
+    """Fine-tunes the finished policy of the same cell without this axis on one instance (paper, section 5.2)."""
+
+    name = "finetune"
+    help = "fine-tune the finished default cell on fine-tuning instance N"
+
+    def pretrained(self, variant: Variant) -> Variant | None:
+        """Start from the cell without this axis."""
+        return variant.without(self.name)
+
+
+class Scratch(_OneInstance):
+    """Trains from scratch on one instance, which fine-tuning is compared with (paper, section 5.2)."""
+
+    name = "scratch"
+    help = "train from scratch on fine-tuning instance N"
+
+
+BUILT_IN: Mapping[str, Axis] = {axis.name: axis for axis in (Cutout(), Alpha(), Finetune(), Scratch())}
+
+
+def axis_named(name: str) -> Axis:
+    """Return the axis `name`: a built-in one, or one of a known study.
+
+    Raises:
+        UserError: there is no such axis.
+    """
+    if name in BUILT_IN:  # without importing any study
+        return BUILT_IN[name]
+    known = axes()
+    if name not in known:
+        raise unknown_name("axis", name, known)
+    return known[name]
+
+
+def axes() -> dict[str, Axis]:
+    """Return all axes by name: the built-in ones, then those of every known study."""
+    added = (axis for study in names("studies") for axis in load_attribute("studies", study, "STUDY").axes)
+    return {**BUILT_IN, **{axis.name: axis for axis in added}}
+
+
+def parse_axis_value(name: str, text: str) -> Value:
+    """Return a value of the axis `name` from text.
+
+    Raises:
+        UserError: there is no such axis, or the value has another type.
+    """
+    axis = axis_named(name)
+    try:
+        value: Value = parse_value(axis.kind, text)
+    except ValueError as error:
+        raise UserError(f"--variant {name}={text}: expected {error}") from error
+    return value

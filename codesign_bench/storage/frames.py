@@ -1,0 +1,126 @@
+"""Results as tidy frames: every row carries what identifies its cell, every axis of its variant among it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from codesign_bench.cell.axes import axis_named
+from codesign_bench.cell.variant import DEFAULT_NAME, FIRST_AXES, Value, Variant, in_axis_order
+from codesign_bench.errors import UserError
+from codesign_bench.storage.cells import StoredCell, find_cells
+from codesign_bench.storage.layout import CURVE_COLUMNS, CURVE_FILE, EVALUATION_FILE
+
+if TYPE_CHECKING:  # pandas takes a second to import, which every cell's process would pay
+    import pandas as pd
+
+LABEL_COLUMN = "label"
+"""The method's name in figures, beside the columns that identify the cell."""
+
+
+def load_results(out: str | Path) -> pd.DataFrame:
+    """Return every evaluation of every cell below `out`, running and failed ones included, as one tidy frame.
+
+    Columns: task, method, variant, one for each axis (cutout, alpha, finetune, scratch, and whatever else a cell
+    varies; NaN where it is not varied), seed, label, then those of `curve.csv`.
+
+    Raises:
+        UserError: there is no such folder, or no result in it.
+    """
+    import pandas as pd
+
+    parts = [(cell, curve) for cell in find_cells(Path(out)) if (curve := _read_curve(cell)) is not None]
+    if not parts:
+        raise UserError(f"no results in '{out}' yet; make some with: codesign-bench run --out {out}")
+    frame = pd.concat(_with_cell_columns(parts), ignore_index=True)
+    return frame.astype({"seed": int, "env_steps": int})
+
+
+def load_evaluations(out: str | Path) -> pd.DataFrame:
+    """Return what every finished cell below `out` reached on each evaluation instance, as one tidy frame.
+
+    Columns: those of `load_results` up to `label`, then `instance` (its number), `instance_<name>` and `design_<name>`
+    in the task's units (NaN for the entries of other tasks), return, success, episode_length, material, effort, and
+    in_cutout where the task has positions.
+
+    Raises:
+        UserError: there is no such folder, or no finished cell in it.
+    """
+    import pandas as pd
+
+    parts = []
+    for cell in find_cells(Path(out)):
+        if cell.is_done and (cell.folder / EVALUATION_FILE).exists():
+            table = pd.read_csv(cell.folder / EVALUATION_FILE)
+            table.insert(0, "instance", range(len(table)))
+            parts.append((cell, table))
+    if not parts:
+        raise UserError(f"no finished cell in '{out}' yet; make some with: codesign-bench run --out {out}")
+    return pd.concat(_with_cell_columns(parts), ignore_index=True).astype({"seed": int})
+
+
+def default_rows(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of cells that vary nothing."""
+    return frame[frame["variant"] == DEFAULT_NAME]
+
+
+def rows_varying(frame: pd.DataFrame, axis: str) -> pd.DataFrame:
+    """Return the rows of cells that vary this axis and no other."""
+    if axis not in frame.columns:
+        return frame.iloc[:0]
+    kind = axis_named(axis).kind  # a column holds whole numbers beside NaN as floats
+    names = {value: Variant.of(**{axis: kind(value)}).name for value in frame[axis].dropna().unique()}
+    return frame[frame["variant"] == frame[axis].map(names)]
+
+
+def require_columns(frame: pd.DataFrame, columns: Sequence[str], what: str) -> None:
+    """Check that a frame has rows and columns.
+
+    Args:
+        frame: to be checked.
+        columns: their names.
+        what: what the frame holds, for the message.
+
+    Raises:
+        UserError: naming what is missing.
+    """
+    missing = [column for column in columns if column not in frame.columns]
+    if missing:
+        raise UserError(f"{what} lack the column{'s' * (len(missing) > 1)} {', '.join(missing)}")
+    if frame.empty:
+        raise UserError(f"{what} have no rows")
+
+
+def _with_cell_columns(parts: Sequence[tuple[StoredCell, pd.DataFrame]]) -> list[pd.DataFrame]:
+    """Put what identifies each cell in front of its table's own columns; all tables get the same axes."""
+    axes = in_axis_order({*FIRST_AXES, *(axis for cell, _ in parts for axis, _ in cell.record.variant)})
+    for cell, table in parts:
+        record = cell.record
+        columns = {
+            "task": record.task,
+            "method": record.method,
+            "variant": record.variant.name,
+            **{axis: _or_nan(record.variant.get(axis)) for axis in axes},
+            "seed": record.seed,
+            LABEL_COLUMN: record.label,
+        }
+        for position, (name, value) in enumerate(columns.items()):
+            table.insert(position, name, value)
+    return [table for _, table in parts]
+
+
+def _or_nan(value: Value | None) -> Value:
+    if value is None:
+        return float("nan")
+    return float(value) if isinstance(value, int) else value
+
+
+def _read_curve(cell: StoredCell) -> pd.DataFrame | None:
+    import pandas as pd
+
+    try:
+        curve = pd.read_csv(cell.folder / CURVE_FILE)
+    except (OSError, ValueError):  # not evaluated yet, or no table
+        return None
+    return None if curve.empty or not set(CURVE_COLUMNS) <= set(curve.columns) else curve

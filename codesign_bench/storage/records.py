@@ -1,0 +1,169 @@
+"""The cell file, `cell.json`: what a cell is, how it was made, how far it is. Read, checked and written here alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from codesign_bench.cell.variant import FIRST_AXES, Variant
+from codesign_bench.config.profiles import DEFAULT_PROFILE
+from codesign_bench.config.settings import StoredConfig
+from codesign_bench.errors import UserError
+from codesign_bench.storage.files import write_json
+
+CELL_FILE = "cell.json"
+SCHEMA = 2
+"""Version 1 held each axis of the variant beside the other entries, and no axes but the first four."""
+
+RUNNING, DONE, FAILED = "running", "done", "failed"
+INTERRUPTED = "interrupted"
+"""Not stored: a cell that is recorded as running while no process holds its lock."""
+
+
+@dataclass(frozen=True)
+class Timings:
+    """When a cell ran, and how long it took, interruptions left out."""
+
+    started: str | None = None
+    """UTC, ISO 8601."""
+    ended: str | None = None
+    """UTC, ISO 8601; None while it runs."""
+    train_s: float | None = None
+    evaluate_s: float | None = None
+    wall_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a cell failed."""
+
+    message: str = ""
+    """One line."""
+    traceback: str = ""
+
+    @property
+    def last_line(self) -> str:
+        """The last line of the traceback, or the message where there is none."""
+        lines = self.traceback.strip().splitlines()
+        return lines[-1] if lines else self.message
+
+
+@dataclass(frozen=True, kw_only=True)
+class CellRecord:
+    """The content of a cell file."""
+
+    task: str
+    method: str
+    variant: Variant
+    seed: int
+    profile: str = DEFAULT_PROFILE
+    label: str = ""
+    """The method's name in figures."""
+    status: str = RUNNING
+    """`RUNNING`, `DONE` or `FAILED`."""
+    env_steps: int = 0
+    config: StoredConfig = field(default_factory=StoredConfig)
+    versions: Mapping[str, str | None] = field(default_factory=dict)
+    """Package -> version; None: not installed."""
+    host: Mapping[str, Any] = field(default_factory=dict)
+    pid: int | None = None
+    timings: Timings = Timings()
+    failure: Failure | None = None
+
+    @property
+    def threads(self) -> int:
+        """Cores of the cell."""
+        return int(self.host.get("threads", 1))
+
+    @classmethod
+    def read(cls, folder: Path) -> CellRecord | None:
+        """Return the record in `folder`, or None when there is none.
+
+        Raises:
+            UserError: it is not one of ours, or damaged.
+        """
+        path = folder / CELL_FILE
+        try:
+            return cls.from_json(json.loads(path.read_text()))
+        except FileNotFoundError:
+            return None
+        except (ValueError, KeyError, TypeError, AttributeError, OSError) as error:
+            reason = f"no {error}" if isinstance(error, KeyError) else str(error)
+            raise UserError(f"cannot read {path} ({reason}); delete its folder to start the cell again") from error
+
+    def write(self, folder: Path) -> None:
+        """Replace the record in `folder`."""
+        write_json(folder / CELL_FILE, self.to_json())
+
+    def ended(self, status: str, **changes: Any) -> CellRecord:
+        """Return the record of the cell now that it has ended with `status`; `changes` are further fields."""
+        timings = replace(changes.pop("timings", self.timings), started=self.timings.started, ended=now())
+        return replace(self, status=status, timings=timings, **changes)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as JSON values."""
+        return {
+            "schema": SCHEMA,
+            "status": self.status,
+            "task": self.task,
+            "method": self.method,
+            "variant": self.variant.name,
+            "axes": self.variant.to_json(),
+            "seed": self.seed,
+            "profile": self.profile,
+            "label": self.label,
+            "env_steps": self.env_steps,
+            "config": self.config.to_json(),
+            "versions": dict(self.versions),
+            "host": dict(self.host),
+            "pid": self.pid,
+            "timings": asdict(self.timings),
+            "failure": None if self.failure is None else asdict(self.failure),
+        }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> CellRecord:
+        """Return the record that `to_json` of this version or of version 0.1.0 (schema 1) told.
+
+        Raises:
+            ValueError, KeyError, TypeError, AttributeError: `content` is something else.
+        """
+        schema, status = content["schema"], content["status"]
+        if schema not in (1, SCHEMA):
+            raise ValueError(f"schema {schema}, made by a newer version; this one reads up to {SCHEMA}")
+        if status not in (RUNNING, DONE, FAILED):
+            raise ValueError(f"unknown status {status!r}")
+        axes = {name: content.get(name) for name in FIRST_AXES} if schema == 1 else content["axes"]
+        failure = content["failure"]
+        return cls(
+            task=_text(content, "task"),
+            method=_text(content, "method"),
+            variant=Variant.from_json(axes),
+            seed=int(content["seed"]),
+            profile=_text(content, "profile"),
+            label=str(content.get("label") or content["method"]),
+            status=status,
+            env_steps=int(content["env_steps"]),
+            config=StoredConfig.from_json(content["config"]),
+            versions=dict(content["versions"].items()),
+            host=dict(content["host"].items()),
+            pid=content.get("pid"),
+            timings=Timings(**content["timings"]),
+            failure=None if failure is None else Failure(str(failure["message"]), str(failure["traceback"])),
+        )
+
+
+def now() -> str:
+    """Return the time, UTC, as records hold it."""
+    return datetime.now(timezone.utc).isoformat(timespec="seconds")
+
+
+def _text(content: Mapping[str, Any], name: str) -> str:
+    value = content[name]
+    if not isinstance(value, str):
+        raise TypeError(f"'{name}' is not text")
+    return value

@@ -1,0 +1,49 @@
+"""What our own profiles set for every PPO-based method, found by hand on tuning seeds (ours)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from codesign_bench.config.settings import Settings, sourced
+
+Tuned = Mapping[str, Mapping[str, Any]]
+"""Profile ("laptop", "quick") -> what it sets; `quick` adds to `laptop`."""
+
+LAYERS = {"laptop": ("laptop",), "quick": ("laptop", "quick")}
+"""Profile -> the parts of a `Tuned` table that make it, later ones winning; other profiles have none."""
+
+PPO: Tuned = {
+    "laptop": {"gamma": 0.98, "final_learning_rate_fraction": 0.2},
+    "quick": {"final_learning_rate_fraction": 1.0},
+}
+"""Differences from the defaults, on every task."""
+
+PPO_BY_TASK: Mapping[str, Mapping[str, Any]] = {
+    "catch_balls": {"design_log_std": -0.3},
+    "lift_cup": {
+        "batch_size": 20_000,
+        "minibatch_size": 2_000,
+        "epochs": 5,
+        "gamma": 0.99,
+        "control_log_std": -1.5,
+    },
+    "fetch_cube": {"gamma": 0.99},
+    "scoop": {"control_log_std": -1.0},
+    "scoop_3d": {"gamma": 0.99, "control_log_std": -1.5},
+}
+"""What `laptop` and `quick` set otherwise for a task, the same for every PPO-based method."""
+
+
+def tuned(profile: str, table: Tuned) -> Settings:
+    """Return what `table` sets in one of our own profiles; nothing in any other."""
+    layers = LAYERS.get(profile, ())
+    return {key: entry for name in layers for key, entry in sourced(table[name], f"{name} profile (ours)").items()}
+
+
+def ppo_settings(profile: str, task_name: str) -> Settings:
+    """Return the optimiser settings of one of our own profiles for a task; nothing for any other profile."""
+    if profile not in LAYERS:
+        return {}
+    of_task = sourced(PPO_BY_TASK.get(task_name, {}), f"tuned for {task_name} (ours)")
+    return {**tuned(profile, PPO), **of_task}

@@ -1,0 +1,79 @@
+"""What tests of several rooms build: cells on disk without training, sweeps of toy cells, entries of configurations."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from codesign_bench.cell.cell import Cell, resolve_cells
+from codesign_bench.cell.grid import grid
+from codesign_bench.cell.variant import DEFAULT, Variant
+from codesign_bench.config.settings import Sourced, StoredConfig
+from codesign_bench.storage.layout import CURVE_COLUMNS, CURVE_FILE, EVALUATION_FILE, write_rows
+from codesign_bench.storage.records import DONE, CellRecord
+from codesign_bench.sweep.runner import run_sweep
+
+VERSION_0_1_0 = Path(__file__).parent / "data" / "version_0_1_0"
+"""A results folder of version 0.1.0 with a policy in every finished cell; nothing was learned in it."""
+
+BUDGET = StoredConfig(run={"steps": Sourced(1000, "default")}, method={"epochs": Sourced(4, "default")})
+"""A configuration with one setting in each part."""
+
+
+def store_cell(
+    out: Path,
+    *,
+    task: str = "push",
+    method: str = "gnn_ppo",
+    seed: int = 0,
+    variant: Variant = DEFAULT,
+    status: str = DONE,
+    curve: Sequence[Mapping[str, Any]] = (),
+    evaluation: Sequence[Mapping[str, Any]] = (),
+    **fields: Any,
+) -> Path:
+    """Write a cell below `out` as if it had run, and return its folder.
+
+    Args:
+        out: a results folder; it need not exist.
+        task: a name; the task need not exist.
+        method: a name; the method need not exist.
+        seed: the cell's.
+        variant: the cell's.
+        status: of its record.
+        curve: rows of its curve, with the columns that matter; others are 0.
+        evaluation: rows of its last evaluation.
+        fields: further fields of its record.
+    """
+    folder = Cell(task, method, seed, variant).folder(out)
+    folder.mkdir(parents=True)
+    record = {"label": method, "profile": "quick", "config": BUDGET, **fields}
+    CellRecord(task=task, method=method, seed=seed, variant=variant, status=status, **record).write(folder)
+    if curve:
+        zeros = dict.fromkeys(CURVE_COLUMNS, 0.0)
+        write_rows(folder / CURVE_FILE, [{**zeros, "env_steps": 0, **row} for row in curve], CURVE_COLUMNS)
+    if evaluation:
+        write_rows(folder / EVALUATION_FILE, evaluation)
+    return folder
+
+
+def rising(*returns: float, every: int = 100) -> list[dict[str, Any]]:
+    """Return rows of a curve that goes through `returns`, one evaluation every so many environment steps."""
+    return [{"env_steps": every * index, "return_mean": value} for index, value in enumerate(returns)]
+
+
+def toy_cells(seeds: int = 1, **changes: Any) -> list[Cell]:
+    """Return toy cells of 200 steps and 4 evaluations; the fixture `toy` makes their names known."""
+    given = {"steps": 200, "overrides": ("evaluations=4",), **changes}
+    return list(grid(tasks=["toy_reach"], methods=["toy_search"], seeds=range(seeds), **given))
+
+
+def sweep(cells: Sequence[Cell], out: Path, **options: Any) -> tuple[int, str]:
+    """Run a sweep; return its exit code and what it printed."""
+    console = Console(record=True, width=200, file=io.StringIO())
+    code = run_sweep(resolve_cells(cells), out, console=console, **options)
+    return code, console.export_text()

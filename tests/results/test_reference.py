@@ -1,0 +1,120 @@
+"""What is shipped under `results/reference` fits together: cells, policies, figures, claims, tables.
+
+Each test takes what is shipped as it is; none demands that there be results of some task or method.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from itertools import groupby
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import codesign_bench as cb
+from codesign_bench.cell.cell import Cell, resolve_cell
+from codesign_bench.cell.variant import DEFAULT
+from codesign_bench.cli import main
+from codesign_bench.config.resolve import differences
+from codesign_bench.deployment.conditions import TRIAL
+from codesign_bench.deployment.deploy import Order, deploy
+from codesign_bench.deployment.tables import load_deployment
+from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.storage.cells import StoredCell, find_cells
+from codesign_bench.storage.layout import POLICY_FILE
+from codesign_bench.storage.policies import policy_and_task
+
+REFERENCE = Path(__file__).resolve().parents[2] / "results" / "reference"
+
+if not REFERENCE.is_dir():
+    pytest.skip("a source distribution leaves the results out", allow_module_level=True)
+
+pytestmark = pytest.mark.reference
+
+CELLS = list(find_cells(REFERENCE))
+DEFAULTS = [cell for cell in CELLS if cell.record.variant == DEFAULT]
+FIRST = [next(group) for _, group in groupby(DEFAULTS, lambda cell: (cell.record.task, cell.record.method))]
+"""One cell of each task and method; cells come in the order of their folders."""
+PLAYABLE = [cell for cell in FIRST if (cell.folder / POLICY_FILE).exists()]
+FIRST_TRIALS = load_deployment(REFERENCE).query("kind == 'own' and trial == 1 and success == 1")
+TOOLS_THAT_WORKED = FIRST_TRIALS.groupby("task")[["task", "tool"]].tail(1).values.tolist()
+"""Of each task on an arm, one tool that succeeded in its first trial."""
+
+
+def name_of(cell: StoredCell) -> str:
+    """Return a cell's path below the results folder, for the name of a test."""
+    return cell.folder.relative_to(REFERENCE).as_posix()
+
+
+def test_every_shipped_cell_is_finished_and_spent_its_budget() -> None:
+    for cell in CELLS:
+        assert cell.is_done, cell.folder
+        budget = cell.record.config.run["steps"].value
+        # A batch of one-seed methods may end on the budget's last episode; none stops short of it.
+        assert cell.record.env_steps >= budget, cell.folder
+
+
+def test_the_pages_say_what_the_results_say() -> None:
+    checked = subprocess.run(
+        [sys.executable, str(REFERENCE.parent / "fill_tables.py"), "--check"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert checked.returncode == 0, f"{checked.stdout}{checked.stderr}; run: python results/fill_tables.py"
+
+
+def test_the_shipped_claims_are_those_of_the_shipped_results(tmp_path: Path) -> None:
+    assert main(["verify", "--results", str(REFERENCE), "--out", str(tmp_path)]) == 0
+    made, shipped = (
+        {row["name"]: row["verdict"] for row in json.loads((folder / "claims.json").read_text())["claims"]}
+        for folder in (tmp_path, REFERENCE / "claims")
+    )
+    assert made == shipped
+
+
+def test_the_shipped_figures_show_the_shipped_cells(tmp_path: Path) -> None:
+    names = ["learning_curves", "final_results", "fine_tuning"]
+    assert main(["plot", *names, "--results", str(REFERENCE), "--out", str(tmp_path)]) == 0
+    for name in names:
+        made, shipped = (pd.read_csv(folder / f"{name}.csv") for folder in (tmp_path, REFERENCE / "figures"))
+        pd.testing.assert_frame_equal(made, shipped, obj=name)
+
+
+def test_the_folder_stays_small() -> None:
+    assert sum(path.stat().st_size for path in REFERENCE.rglob("*") if path.is_file()) < 60e6
+
+
+@pytest.mark.parametrize("cell", PLAYABLE, ids=name_of)
+def test_a_shipped_policy_gets_the_shipped_return(cell: StoredCell) -> None:
+    told = cell.last_evaluation()
+    summary = evaluate(cb.load_task(cell.record.task), cb.load_policy(cell.folder)).summary
+    # Another processor rounds otherwise, and contact makes more of it: a few of 128 episodes may then end otherwise.
+    assert summary["return_mean"] == pytest.approx(told["return_mean"], abs=0.1 * max(1.0, abs(told["return_mean"])))
+    assert summary["success_rate"] == pytest.approx(told["success_rate"], abs=0.06)
+
+
+@pytest.mark.parametrize("cell", FIRST, ids=name_of)
+def test_the_profile_of_a_shipped_cell_still_means_what_it_was_run_with(cell: StoredCell) -> None:
+    record = cell.record
+    wanted = Cell(record.task, record.method, record.seed, record.variant, record.profile)
+    assert differences(record.config, resolve_cell(wanted).config) == []
+
+
+def test_every_shipped_tool_was_tried_equally_often() -> None:
+    trials = load_deployment(REFERENCE).groupby(["task", "kind", "tool"]).size()
+    assert (trials.groupby(["task", "kind"]).nunique() == 1).all()
+
+
+@pytest.mark.parametrize(("name", "tool"), TOOLS_THAT_WORKED)
+def test_a_shipped_policy_succeeds_on_the_panda_as_its_table_says(name: str, tool: int, tmp_path: Path) -> None:
+    (folder,) = (cell.folder for cell in PLAYABLE if (cell.record.task, cell.record.method) == (name, "gnn_ppo"))
+    policy, task = policy_and_task(folder, name)
+    (again,) = deploy(task, policy, Order(TRIAL, tools=(tool,), gifs=False), tmp_path, lambda line: None)
+    frame = load_deployment(REFERENCE)
+    told = frame[(frame["task"] == name) & (frame["kind"] == "own") & (frame["tool"] == tool) & (frame["trial"] == 1)]
+    assert again["success"] == 1
+    assert again["steps"] == pytest.approx(told["steps"].item(), abs=5), "another processor rounds otherwise"

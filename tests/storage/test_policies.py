@@ -1,0 +1,40 @@
+"""A cell's final policy on disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import store_cell, sweep, toy_cells
+
+from codesign_bench import load_policy
+from codesign_bench.errors import UserError
+from codesign_bench.storage.policies import policy_and_task
+
+
+@pytest.mark.parametrize(("status", "named"), [("done", "policy file is missing"), ("running", "'interrupted'")])
+def test_a_cell_without_a_policy_says_so(tmp_path: Path, status: str, named: str) -> None:
+    with pytest.raises(UserError, match=named):
+        load_policy(store_cell(tmp_path, status=status))
+    with pytest.raises(UserError, match="not a cell folder"):
+        load_policy(tmp_path)
+
+
+@pytest.mark.usefixtures("toy")
+def test_the_policy_on_disk_is_the_one_that_was_judged(tmp_path: Path) -> None:
+    (cell,) = toy_cells()
+    sweep([cell], tmp_path)
+    folder = cell.folder(tmp_path)
+    observation = np.zeros((2, 6), dtype=np.float32)
+    design = load_policy(folder).design(observation)
+    assert design.shape == (2, 1)
+    lengths = np.loadtxt(folder / "evaluation.csv", delimiter=",", skiprows=1, usecols=1)
+    np.testing.assert_allclose(lengths, 0.1 + (design[0, 0] + 1.0) * 0.5 * 0.9)
+    assert policy_and_task(folder, "toy_reach")[1].name == "toy_reach"
+    with pytest.raises(UserError, match="trained on 'toy_reach', not on 'push'"):
+        policy_and_task(folder, "push")
+    damaged = folder / "policy.safetensors"
+    damaged.write_bytes(damaged.read_bytes()[:-3])
+    with pytest.raises(UserError, match=r"policy\.safetensors"):
+        load_policy(folder)

@@ -1,0 +1,99 @@
+"""`reproduce` runs what an experiment needs once, draws, verifies and reports it."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from codesign_bench.cell.variant import Variant
+from codesign_bench.cli import main
+from codesign_bench.console import Log
+from codesign_bench.errors import UserError
+from codesign_bench.study import Experiment, Grid, Study
+from codesign_bench.study.reproduce import reproduce
+
+SMALL = ("steps=200", "evaluations=2", "fine_tuning_steps=100")
+DEFAULTS = Grid(("toy_reach",), ("toy_search",), (0, 1), overrides=SMALL)
+
+
+def study_of(experiment: Experiment) -> Study:
+    """Return a study with one experiment."""
+    return Study(name="toys", title="Toys", question="Does it run?", experiments={"toy": experiment})
+
+
+def run(experiment: Experiment, folder: Path) -> tuple[int, str]:
+    """Reproduce an experiment below `folder`; return the exit code and what was printed."""
+    console = Console(record=True, width=300, file=io.StringIO())
+    code = reproduce(
+        study_of(experiment),
+        ["toy"],
+        profile="laptop",
+        results=folder / "runs",
+        figures=folder / "figures",
+        console=console,
+        jobs=1,
+    )
+    return code, console.export_text()
+
+
+@pytest.mark.usefixtures("toy")
+def test_it_runs_what_is_missing_draws_and_does_nothing_twice(tmp_path: Path) -> None:
+    scratch = replace(DEFAULTS, seeds=(0,), variants=(Variant.of(scratch=1),))
+    experiment = Experiment(("learning_curves", "fine_tuning"), "ours", ((DEFAULTS,), (scratch,)))
+    code, text = run(experiment, tmp_path)
+    assert code == 0, text
+    for name in ("learning_curves", "fine_tuning"):
+        assert (tmp_path / "figures" / f"{name}.png").exists(), text
+    assert (tmp_path / "claims" / "claims.md").exists()
+    assert "toy_reach" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "2 of them done before" in run(experiment, tmp_path)[1]
+
+
+@pytest.mark.usefixtures("toy")
+def test_what_is_measured_follows_the_cells_and_a_failure_is_said(tmp_path: Path) -> None:
+    def measured(results: Path, profile: str, log: Log) -> None:
+        assert any(results.glob("toy_reach/toy_search/default/seed-00/policy.safetensors"))
+        log(f"measured under {profile}")
+
+    def impossible(results: Path, profile: str, log: Log) -> None:
+        raise UserError("no arm here")
+
+    experiment = Experiment(("learning_curves",), "ours", ((DEFAULTS,),), measures=(measured, impossible))
+    code, text = run(experiment, tmp_path)
+    assert code == 0
+    assert "measured under laptop" in text
+    assert "measurement of toy left out: no arm here" in text
+
+
+@pytest.mark.usefixtures("toy")
+def test_nothing_drawn_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="nothing can be drawn of toy"):
+        run(Experiment(("tradeoff",), "ours"), tmp_path)
+
+
+def test_an_experiment_without_cells_ends_well_in_an_empty_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["reproduce", "hyperparameter_tables"]) == 0
+    printed = capsys.readouterr().out
+    assert "hyperparameter_tables.png" in printed
+    assert "report left out: no results folder" in printed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["figure_7"], "unknown experiment 'figure_7'; choose from: task_gallery"),
+        (["tradeoff", "--profile", "slow"], "unknown profile 'slow'; choose from: quick, laptop, paper"),
+        (["tradeoff", "--seeds", "0"], "--seeds must be at least 1, not 0"),
+        (["tradeoff", "--study", "neurips"], "unknown study 'neurips'"),
+    ],
+)
+def test_bad_input_gets_one_line(capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:
+    assert main(["reproduce", *arguments]) == 2
+    assert message in capsys.readouterr().err

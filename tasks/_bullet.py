@@ -11,21 +11,37 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import ClassVar
+from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
 from PIL import Image, ImageDraw
 
-from codesign_bench.task import BoxPart, Floats, Frame, Physics, Slots
+from codesign_bench.task import OURS, BoxPart, Floats, Frame, Given, Physics, Slots, constants
 from codesign_bench.task.robot import ArmReport, DeployedSimulator
 
-from ._carriers import LEVEL, Carrier, Gantry, HeldTool, ToolShape, pybullet, run
+from ._carriers import CARRIER_SCENE, LEVEL, Carrier, Gantry, HeldTool, ToolShape, pybullet, run
 from ._scene import COLOURS, PICTURE_PIXELS, Clock
 
-GRAVITY = 9.81
-"""m/s^2."""
+GRAVITY: Annotated[float, Given("m/s^2", "the Earth's")] = 9.81
+"""Of the scene."""
+PUSH_FORCE: Annotated[float, Given("N", OURS)] = 50.0
+"""Largest force of a sliding joint of the gantry."""
+TURN_TORQUE = 10.0
+"""Largest torque of a turning joint of the gantry, N m (ours)."""
+TOOL_MASS: Annotated[float, Given("kg", OURS)] = 0.5
+"""Of the tool."""
+TOOL_FRICTION: Annotated[float, Given("1", OURS)] = 1.0
+"""Of the tool's surface; PyBullet multiplies the frictions of the two bodies of a contact."""
+SOLVER_ITERATIONS: Annotated[int, Given("1", "PyBullet's own")] = 50
+"""Of the contact solver in every physics step."""
+BULLET_SCENE = {**CARRIER_SCENE, **constants(__name__)}
+"""Constants of the tasks in PyBullet, unless they have others of the same name."""
 MAX_SLOTS = 28
 """For `Task.max_slots`: an idle world takes over 20 MB, and a cell should stay below 1 GB (ours)."""
+Triple: TypeAlias = tuple[float, float, float]
+"""Along x, y and z, or of width, length and height."""
+PLACE, ROTATION, VELOCITY, SPIN = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)
+"""Columns of `BulletSimulator.bodies`: position (m), quaternion, velocity (m/s), angular velocity (rad/s)."""
 PICTURE_SHAPE = (3 * PICTURE_PIXELS // 4, PICTURE_PIXELS)
 """Height and width of a picture in pixels."""
 
@@ -100,14 +116,11 @@ class BulletSimulator(DeployedSimulator):
     """Lowest and highest x, y and z where the centres of moving bodies may be, m."""
     turning_axes: ClassVar[tuple[int, ...]] = ()
     """0, 1, 2 for x, y, z: the axes that the tool turns about, behind the three sliding joints."""
-    push_force: ClassVar[float] = 50.0
-    """Largest force of a sliding joint, N."""
-    turn_torque: ClassVar[float] = 10.0
-    """Largest torque of a turning joint, N m."""
-    tool_mass: ClassVar[float] = 0.5
-    tool_friction: ClassVar[float] = 1.0
-    """PyBullet multiplies the frictions of the two bodies of a contact."""
-    solver_iterations: ClassVar[int] = 50
+    push_force: ClassVar[float] = PUSH_FORCE
+    turn_torque: ClassVar[float] = TURN_TORQUE
+    tool_mass: ClassVar[float] = TOOL_MASS
+    tool_friction: ClassVar[float] = TOOL_FRICTION
+    solver_iterations: ClassVar[int] = SOLVER_ITERATIONS
     contact_correction: ClassVar[float | None] = None
     """Share of an overlap that a physics step takes away; None: PyBullet's own."""
 
@@ -122,8 +135,8 @@ class BulletSimulator(DeployedSimulator):
         self.held: list[HeldTool | None] = [None] * num_slots
         self.tools: list[int | None] = [None] * num_slots
         """The bodies that hold the tools, these included."""
-        self.bodies: Floats = np.zeros((num_slots, num_bodies, 13))
-        """(B, N, 13): position (3), rotation (4), velocity (3), angular velocity (3) of the moving bodies."""
+        self.bodies: Floats = np.zeros((num_slots, num_bodies, SPIN.stop))
+        """(B, N, 13): `PLACE`, `ROTATION`, `VELOCITY` and `SPIN` of the moving bodies."""
         self.pose: Floats = np.zeros((num_slots, 3 + len(self.turning_axes)))
         """(B, A): pose of the held point."""
         self.carrier: Carrier = carrier or Gantry(self.turning_axes, self.push_force, self.turn_torque)
@@ -271,7 +284,7 @@ class BulletSimulator(DeployedSimulator):
             for body in self.moving[slot]:
                 for part in (*place(body, world), *motion(body, world)):
                     values.extend(part)
-        self.bodies[slots] = np.array(values).reshape(len(slots), -1, 13)
+        self.bodies[slots] = np.array(values).reshape(len(slots), -1, SPIN.stop)
         return self.bodies[slots]
 
     def perturb(self, slot: int, friction: float, mass: float) -> None:
@@ -308,8 +321,8 @@ class BulletSimulator(DeployedSimulator):
         low, high = np.array(self.room).T
         return Physics(
             overlap=max((-point[8] for point in points), default=0.0),
-            speed=float(np.linalg.norm(states[:, 7:10], axis=1).max(initial=0.0)),
-            contained=bool(((states[:, :3] >= low) & (states[:, :3] <= high)).all()),
+            speed=float(np.linalg.norm(states[:, VELOCITY], axis=1).max(initial=0.0)),
+            contained=bool(((states[:, PLACE] >= low) & (states[:, PLACE] <= high)).all()),
         )
 
     def tool_shapes(self, slot: int) -> tuple[BoxPart, ...]:

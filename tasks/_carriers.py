@@ -8,10 +8,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from codesign_bench.errors import UserError
+from codesign_bench.task import OURS, Given, constants
 from codesign_bench.task.robot import ArmReport
 
 try:
@@ -21,8 +23,9 @@ except ModuleNotFoundError as error:
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 """The rotation that turns nothing."""
-CARRIAGE_MASS = 0.1
-"""Of each moving part of the gantry but the last, which is the tool, kg (ours)."""
+CARRIAGE_MASS: Annotated[float, Given("kg", OURS)] = 0.1
+"""Of each moving part of the gantry but the last, which is the tool."""
+CARRIER_SCENE = constants(__name__)
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,25 @@
-"""What tasks that can be deployed share: the arm by its name, and what its gripper holds."""
+"""What tasks that can be deployed share: the paper's trials, the arm by its name, and what its gripper holds."""
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from codesign_bench.errors import unknown_name
-from codesign_bench.task import ToolPart
+from codesign_bench.task import Given, ToolPart, constants
 from codesign_bench.task.robot import ARMS, IDEAL
 
 from ._carriers import Carrier
 from ._scene import Clock
+
+REAL_ROBOT = 'paper, appendix "Real Robot Experiment Details"'
+TRIALS_PER_TOOL: Annotated[int, Given("trials", 'paper, section "Evaluation on a real robot"', "trials")] = 5
+"""With each tool on its own instance."""
+TRIAL_STEPS: Annotated[int, Given("control steps", REAL_ROBOT, "max_steps")] = 100
+"""Until a trial ends without success."""
+NEAR_MISS: Annotated[float, Given("m", "paper, figure of the grid of starts", "near_miss")] = 0.05
+"""A failure that ends this near to success counts as nearly solved; the paper counts so for the cube alone."""
+DEPLOYED_SCENE = constants(__name__)
+"""Constants of the tasks that can be deployed."""
 
 
 def arm_carrier(arm: str, base: tuple[float, float, float], clock: Clock) -> Carrier | None:

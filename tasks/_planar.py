@@ -10,25 +10,46 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar, TypeAlias
+from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
 import pymunk
 from PIL import Image, ImageDraw
 from pymunk import batch
 
-from codesign_bench.task import Box, Floats, Frame, Physics, PlanarPart, Simulator, Slots, ToolGraph
+from codesign_bench.task import (
+    OURS,
+    Box,
+    Floats,
+    Frame,
+    Given,
+    Physics,
+    PlanarPart,
+    Simulator,
+    Slots,
+    ToolGraph,
+    constants,
+)
 
 from ._scene import COLOURS, PICTURE_PIXELS, Clock
 
 Point: TypeAlias = Sequence[float]
 """x and y, m."""
 
-LINK_HALF_WIDTH = 0.25
-"""Half the thickness of a link, m (ours)."""
+LINK_HALF_WIDTH: Annotated[float, Given("m", OURS)] = 0.25
+"""Half the thickness of a link."""
+CHAIN_SCENE = constants(__name__)
+"""Constants of the tasks that use the chain."""
+
+PLACE, VELOCITY = slice(0, 2), slice(2, 4)
+"""Columns of `PlanarSimulator.bodies`: x and y (m); velocity along x and y (m/s)."""
 
 CHAIN_GRAPH = ToolGraph(num_nodes=3, edges=((0, 1), (1, 2)), parameter_nodes=(0, 1, 2, 1, 2))
 """Three links in a row; the robot holds the free end of link 0; a joint's angle belongs to the link behind it."""
+LENGTH_NAMES = ("link_1_length", "link_2_length", "link_3_length")
+ANGLE_NAMES = ("joint_1_angle", "joint_2_angle")
+LENGTHS, ANGLES = slice(0, len(LENGTH_NAMES)), slice(len(LENGTH_NAMES), len(LENGTH_NAMES) + len(ANGLE_NAMES))
+"""Where a design of `chain_design_space` holds the links' lengths (m) and the joints' angles (rad)."""
 
 
 def chain_design_space(
@@ -39,11 +60,11 @@ def chain_design_space(
 ) -> Box:
     """Return a chain's design space: length = init (1 + ratio), angle = scale ratio; `angle_scale` in degrees."""
     lengths = {
-        f"link_{index + 1}_length": (length * (1.0 + length_ratio[0]), length * (1.0 + length_ratio[1]), "m")
-        for index, length in enumerate(length_init)
+        name: (length * (1.0 + length_ratio[0]), length * (1.0 + length_ratio[1]), "m")
+        for name, length in zip(LENGTH_NAMES, length_init, strict=True)
     }
     low, high = (float(np.deg2rad(angle_scale * ratio)) for ratio in angle_ratio)
-    return Box.of(**lengths, joint_1_angle=(low, high, "rad"), joint_2_angle=(low, high, "rad"))
+    return Box.of(**lengths, **dict.fromkeys(ANGLE_NAMES, (low, high, "rad")))
 
 
 def chain_points(designs: Floats, first_link_angle: float) -> Floats:
@@ -51,11 +72,17 @@ def chain_points(designs: Floats, first_link_angle: float) -> Floats:
 
     The first link points along `first_link_angle` (rad, from the x axis); each joint turns the rest of the chain.
     """
-    headings = first_link_angle + np.cumsum(np.pad(designs[:, 3:], ((0, 0), (1, 0))), axis=1)
-    steps = designs[:, :3, None] * np.stack([np.cos(headings), np.sin(headings)], axis=-1)
+    headings = first_link_angle + np.cumsum(np.pad(designs[:, ANGLES], ((0, 0), (1, 0))), axis=1)
+    steps = designs[:, LENGTHS, None] * np.stack([np.cos(headings), np.sin(headings)], axis=-1)
     points = np.zeros((len(designs), 4, 2))
     np.cumsum(steps, axis=1, out=points[:, 1:])
     return points
+
+
+def chain_material(designs: Floats, space: Box) -> Floats:
+    """Return the used share (b,) of the largest total link length of a chain's `space`, for designs (b, D)."""
+    total: Floats = designs[:, LENGTHS].sum(axis=1) / sum(space.high[LENGTHS])
+    return total
 
 
 def chain_parts(points: Floats, half_width: float) -> tuple[PlanarPart, ...]:
@@ -92,7 +119,7 @@ class PlanarSimulator(Simulator):
         self.clock = clock
         self.spaces: list[pymunk.Space] = [pymunk.Space() for _ in range(num_slots)]
         self.bodies: Floats = np.zeros((num_slots, num_bodies, 4))
-        """(B, bodies, 4): x, y (m), vx, vy (m/s) of the bodies that `build_space` added, in its order."""
+        """(B, bodies, 4): `PLACE` and `VELOCITY` of the bodies that `build_space` added, in its order."""
         self._buffer = batch.Buffer()
 
     @abstractmethod

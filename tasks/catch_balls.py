@@ -5,172 +5,213 @@ Shapes: `b` slots a call names, `I` = 10 instance, `D` = 5 design, `C` = 1 contr
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pymunk
 
-from codesign_bench.studies.corl2023.scenes import PLANAR_SCENES
 from codesign_bench.task import (
+    OURS,
     Behaviour,
     Booleans,
     Box,
     ByProfile,
     Floats,
+    Given,
     Quantity,
     Simulator,
-    Singles,
     Slots,
     Soundness,
     Task,
     ToolPart,
+    constants,
 )
 
 from ._planar import (
     CHAIN_GRAPH,
+    CHAIN_SCENE,
     COLOURS,
     LINK_HALF_WIDTH,
+    PLACE,
+    VELOCITY,
     Canvas,
     Clock,
     PlanarSimulator,
     View,
     chain_design_space,
+    chain_material,
     chain_parts,
     chain_points,
     chain_tool,
 )
 
-TABLE = PLANAR_SCENES["catch_balls"]
+PAPER = "paper, table of catch balls"
 
-HAND_START = np.array(TABLE.tool_position_init, dtype=np.float64)
-"""Where the held end starts, m (paper, table of catch balls); it moves along x alone (paper)."""
-FIRST_LINK_ANGLE = -0.5 * np.pi
-"""The first link hangs down from the hand, rad (ours): both joints turned one way make a pan on that side of it."""
-MAX_SPEED = 1.0
-"""Largest speed of the hand, m/s (ours): until the balls come down it cannot change the side of a tool."""
-MAX_ACCELERATION = 10.0
-"""Largest acceleration of the hand, m/s^2 (ours): a tool does not bat balls."""
+HAND_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([20.0, 10.0])
+"""Where the held end starts; it moves along x alone (paper)."""
+LENGTH_INIT: Annotated[tuple[float, float, float], Given("m", PAPER, "tool_length_init")] = (2.0, 1.0, 1.0)
+"""Of the links, from which the design space is made: length = initial length (1 + ratio)."""
+LENGTH_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_length_ratio")] = (-0.5, 2.0)
+"""Range of a length's ratio."""
+ANGLE_SCALE: Annotated[float, Given("degrees", PAPER, "tool_angle_scale")] = 60.0
+"""Angle of ratio 1: angle = scale * ratio."""
+ANGLE_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_angle_ratio")] = (-1.0, 1.0)
+"""Range of an angle's ratio."""
+FIRST_LINK_ANGLE: Annotated[float, Given("rad", OURS)] = -0.5 * np.pi
+"""The first link hangs down from the hand: both joints turned one way make a pan on that side of it."""
+RAIL: Annotated[float, Given("m", OURS)] = 5.0
+"""How far the hand can go to the left or right within the time limit."""
+MAX_SPEED: Annotated[float, Given("m/s", OURS)] = 1.0
+"""Largest speed of the hand: until the balls come down it cannot change the side of a tool."""
+MAX_ACCELERATION: Annotated[float, Given("m/s^2", OURS)] = 10.0
+"""Largest acceleration of the hand: a tool does not bat balls."""
 
-NUM_BALLS = 3
-"""(paper)"""
-BALL_RADIUS = 0.5
-"""m (ours)."""
-GRAVITY = 8.0
-"""m/s^2 (ours)."""
-LINK_FRICTION = 0.7
-"""Between link and ball (ours). The first link has none, so that no ball balances on the hand."""
-BALL_FRICTION = 0.04
-"""Between two balls (ours): they do not stay piled up as a tower."""
+NUM_BALLS: Annotated[int, Given("balls", 'paper, appendix "Environment Details"')] = 3
+"""Thrown in an episode."""
+BALL_RADIUS: Annotated[float, Given("m", OURS)] = 0.5
+"""Of a ball."""
+GRAVITY: Annotated[float, Given("m/s^2", OURS)] = 8.0
+"""Of the scene."""
+LINK_FRICTION: Annotated[float, Given("1", OURS)] = 0.7
+"""Between link and ball. The first link has none, so that no ball balances on the hand."""
+BALL_FRICTION: Annotated[float, Given("1", OURS)] = 0.04
+"""Between two balls: they do not stay piled up as a tower."""
 
-LANDING_DISTANCE = (1.0, 5.0)
-"""Smallest and largest distance from the hand's start of the place where the balls come down, m (ours)."""
-LANDING_SPREAD = 1.2
-"""Largest distance of a ball's own place from that place, m (ours)."""
-START_HEIGHTS = ((16.5, 17.0), (18.25, 18.75), (20.0, 20.5))
-"""Lowest and highest start of each ball, m (ours).
+LANDING_DISTANCE: Annotated[tuple[float, float], Given("m", OURS)] = (1.0, 5.0)
+"""Smallest and largest distance from the hand's start of the place where the balls come down."""
+LANDING_SPREAD: Annotated[float, Given("m", OURS)] = 1.2
+"""Largest distance of a ball's own place from that place."""
+START_HEIGHTS: Annotated[tuple[tuple[float, float], ...], Given("m", OURS)] = (
+    (16.5, 17.0),
+    (18.25, 18.75),
+    (20.0, 20.5),
+)
+"""Lowest and highest start of each ball: above every tool, and so far apart that balls do not meet in the air."""
+THROW_SPEED: Annotated[float, Given("m/s", OURS)] = 3.0
+"""Largest speed along x at which a ball is thrown."""
 
-All lie above every tool. They differ by more than a ball's size, so that balls do not meet in the air.
-"""
-THROW_SPEED = 3.0
-"""Largest speed along x at which a ball is thrown, m/s (ours)."""
+SLOW: Annotated[float, Given("m/s", OURS)] = 0.5
+"""A ball lies still on the tool if it is slower than this, as seen from the tool."""
+PILE_HEIGHT: Annotated[float, Given("m", OURS)] = 2.5
+"""A ball whose centre is less than this above a link lies on it or on balls that lie on it."""
+HOLD_STEPS: Annotated[int, Given("control steps", OURS)] = 15
+"""A ball is caught once it has been held for so long in a row."""
+SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
+"""Added in every control step."""
+SUCCESS_REWARD: Annotated[float, Given("1", "ours; the paper lists one for its 3D tasks only")] = 1.0
+"""Added once, when all balls are caught."""
 
-SLOW = 0.5
-"""A ball lies still on the tool if it is slower than this, as seen from the tool, m/s (ours)."""
-PILE_HEIGHT = 2.5
-"""A ball whose centre is less than this above a link lies on it or on balls that lie on it, m (ours)."""
-HOLD_STEPS = 15
-"""A ball is caught once it has been held for so many control steps in a row (ours)."""
-SUCCESS_REWARD = 1.0
-"""Added once, when all balls are caught (ours; the paper lists one for its 3D tasks only)."""
+FLOOR: Annotated[float, Given("m", OURS)] = -6.0
+"""Height of the floor: even the longest tool leaves room for a pile of three balls beneath it."""
+WALLS: Annotated[tuple[float, float], Given("m", OURS)] = (6.0, 34.0)
+"""Where walls end the scene on the left and right: no tool gets as near to them as two balls are wide."""
 
-FLOOR = -6.0
-"""Height of the floor, m: even the longest tool leaves room for a pile of three balls beneath it (ours)."""
-WALLS = (6.0, 34.0)
-"""Where walls end the scene on the left and right, m: no tool gets as near to them as two balls are wide (ours)."""
+HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 150
+"""Time limit."""
+STEPS_PER_CONTROL: Annotated[int, Given("physics steps", OURS, "control_steps_per_action")] = 4
+"""In a control step."""
+PHYSICS_PERIOD: Annotated[float, Given("s", OURS)] = 1.0 / 120.0
+"""Of a physics step: the fastest ball moves a quarter of its radius."""
+CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
 
-CLOCK = Clock(steps=4, period=1.0 / 120.0)
-"""Four physics steps per control step (ours), s: the fastest ball moves a quarter of its radius in a step."""
+
+CONTROL = Box.of(velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"))
+HAND_SPEED = CONTROL.index("velocity_x")
+INSTANCE = Box.of(
+    landing_x=(float(HAND_START[0]) - LANDING_DISTANCE[1], float(HAND_START[0]) + LANDING_DISTANCE[1], "m"),
+    **{f"ball_{k + 1}_offset": (-LANDING_SPREAD, LANDING_SPREAD, "m") for k in range(NUM_BALLS)},
+    **{f"ball_{k + 1}_height": (*START_HEIGHTS[k], "m") for k in range(NUM_BALLS)},
+    **{f"ball_{k + 1}_speed": (-THROW_SPEED, THROW_SPEED, "m/s") for k in range(NUM_BALLS)},
+)
+LANDING = INSTANCE.index("landing_x")
+OFFSETS, HEIGHTS, SPEEDS = (
+    INSTANCE.slice(*(f"ball_{k + 1}_{what}" for k in range(NUM_BALLS))) for what in ("offset", "height", "speed")
+)
+
+BALL = Box.of(
+    from_hand_x=(-25.0, 25.0, "m"),
+    from_hand_y=(-25.0, 25.0, "m"),
+    velocity_x=(-25.0, 25.0, "m/s"),
+    velocity_y=(-25.0, 25.0, "m/s"),
+    held=(0.0, 1.0, "1"),
+)
+"""What is observed of one ball."""
+STATE = Box.of(
+    hand_x=(float(HAND_START[0]) - RAIL, float(HAND_START[0]) + RAIL, "m"),
+    hand_velocity=(-MAX_SPEED, MAX_SPEED, "m/s"),
+    **{
+        f"ball_{k + 1}_{name}": (low, high, unit)
+        for k in range(NUM_BALLS)
+        for name, low, high, unit in zip(BALL.names, BALL.low, BALL.high, BALL.units, strict=True)
+    },
+)
+HAND, HAND_VELOCITY, BALLS = STATE.index("hand_x"), STATE.index("hand_velocity"), STATE.group("ball_")
+
+BALL_BODIES, TOOL_BODY = slice(0, NUM_BALLS), NUM_BALLS
+"""Rows of `PlanarSimulator.bodies`."""
 
 
 class CatchBalls(Task):
     """Catch three balls that fall from the sky (paper, appendix "Environment Details").
 
-    Seen from the side. The hand moves along a rail. Its tool is a chain of three links; the first hangs down from the
-    hand, the other two can be turned to the left or to the right of it and so make a pan on that side. The balls are
-    thrown and come down around one place on the left or on the right of the hand. The hand is too slow to bring a pan
-    from one side to the other before they arrive, so a tool that catches on one side hardly catches on the other; how
-    far away the balls come down decides how long the links must be, or how far the hand must move.
+    Seen from the side, a hand moves along a rail and holds a chain of three links; the first hangs down from it, the
+    other two can be turned to the left or to the right and so make a pan on that side. The balls are thrown and come
+    down around one place to the left or to the right of the hand. The hand is too slow to bring a pan from one side to
+    the other before they arrive, so a tool that catches on one side hardly catches on the other. How far away the balls
+    come down decides how long the links must be, or how far the hand must move.
 
     Action space
-        Design, 5: lengths of three links, 1 to 6 m and twice 0.5 to 3 m, and the two angles between them, +-60 degrees
-        (paper, table of catch balls). Control, 1: velocity of the hand along x (paper), +-1 m/s (ours), which changes
-        by at most 10 m/s^2 (ours).
+        Design, 5: lengths of the three links (m) and the two angles between them (rad) (paper). Control, 1: velocity of
+        the hand along x (m/s) (paper; range ours); the hand's acceleration is limited (ours).
 
     Observation
-        | index | what | unit | range |
-        | --- | --- | --- | --- |
-        | 0 | hand's position x | m | 15 .. 25 |
-        | 1 | hand's velocity | m/s | -1 .. 1 |
-        | 2-6, 7-11, 12-16 | for each ball: from hand to ball x, y | m | -25 .. 25 |
-        | | its velocity x, y | m/s | -25 .. 25 |
-        | | whether it is held | | 0 .. 1 |
-        | 17 | goal: x of the place where the balls come down | m | 15 .. 25 |
-
-        followed by the design (5, normalised) and the phase (3).
+        State, 17: place x (m) and velocity (m/s) of the hand; for each ball, way from the hand x, y (m), velocity x, y
+        (m/s), and whether it is held. Goal, 1: x of the place where the balls come down (m). Then the design and the
+        phase.
 
     Design space
-        `CatchBalls.design_space`; length = initial length (1 + r), r in [-0.5, 2], initially 2, 1 and 1 m;
-        angle = 60 degrees r, r in [-1, 1].
+        Length = initial length (1 + ratio), angle = scale * ratio (our reading of the paper's table). The first link
+        points down (ours); positive angles turn the chain to the right.
 
     Goal space
-        Where the balls come down: 1 to 5 m from the hand's start, left or right, uniform (ours). The balls' starts,
-        which vary as in the paper, are seen at the design step, too.
+        Where the balls come down, left or right of the hand's start, uniform (ours). The balls' starts vary as in the
+        paper: each has a height, a speed along x and its own place near the goal where it reaches the hand's height.
+        They are no part of the goal, but the state shows them at the design step.
 
     Reward
-        (held now - held before) / 3 - 0.001 per control step; +1 on success. A ball is held if its centre is above a
-        link by less than 2.5 m and below the hand, and if it is slower than 0.5 m/s as seen from the tool. An
-        episode's return lies below 2.
+        The change in the share of balls that are held, less the paper's slack, and a bonus on success. A ball is held
+        if its centre is a little above a link and below the hand, and if it is slow as seen from the tool. What is let
+        go again is taken back, so nothing is earned twice. An episode's return is below 2.
 
     Starting state
-        Hand at rest at (20, 10) (paper). Balls start 16.5 to 17, 18.25 to 18.75 and 20 to 20.5 m high, thrown at up to
-        3 m/s to the left or right, from where each reaches the hand's height within 1.2 m of the goal (ours).
+        The hand at rest where the paper's table has it; the balls above every tool, each at its own height (ours).
 
     Episode end
-        Success: each ball has been held for 15 control steps, half a second, and still is. Failure: a ball has fallen
-        below the tool, and every other one has, too, or is caught. Time limit: 150 control steps (paper) of 1/30 s.
+        Success when every ball is caught, that is, has been held for a while and still is; failure when a ball is lost
+        and no other can be caught any more; or the time limit.
     """
 
     name = "catch_balls"
     title = "Catch balls"
-    horizon = TABLE.max_episode_steps
+    scene: ClassVar = {**CHAIN_SCENE, **constants(__name__)}
+    horizon = HORIZON
     control_period = CLOCK.control_period
-    design_space = chain_design_space(
-        TABLE.tool_length_init, TABLE.tool_length_ratio, TABLE.tool_angle_scale, TABLE.tool_angle_ratio
-    )
+    design_space = chain_design_space(LENGTH_INIT, LENGTH_RATIO, ANGLE_SCALE, ANGLE_RATIO)
     tool_graph = CHAIN_GRAPH
-    control_space = Box.of(velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"))
-    instance_space = Box.of(
-        landing_x=(float(HAND_START[0]) - LANDING_DISTANCE[1], float(HAND_START[0]) + LANDING_DISTANCE[1], "m"),
-        **{f"ball_{k + 1}_offset": (-LANDING_SPREAD, LANDING_SPREAD, "m") for k in range(NUM_BALLS)},
-        **{f"ball_{k + 1}_height": (*START_HEIGHTS[k], "m") for k in range(NUM_BALLS)},
-        **{f"ball_{k + 1}_speed": (-THROW_SPEED, THROW_SPEED, "m/s") for k in range(NUM_BALLS)},
-    )
+    control_space = CONTROL
+    instance_space = INSTANCE
     goal_size = 1
-    state_space = Box.of(
-        hand_x=(float(HAND_START[0]) - 5.0, float(HAND_START[0]) + 5.0, "m"),
-        hand_velocity=(-MAX_SPEED, MAX_SPEED, "m/s"),
-        **{
-            f"ball_{k + 1}_{entry}": (low, high, unit)
-            for k in range(NUM_BALLS)
-            for entry, low, high, unit in (
-                ("from_hand_x", -25.0, 25.0, "m"),
-                ("from_hand_y", -25.0, 25.0, "m"),
-                ("velocity_x", -25.0, 25.0, "m/s"),
-                ("velocity_y", -25.0, 25.0, "m/s"),
-                ("held", 0.0, 1.0, "1"),
-            )
-        },
-    )
+    position_entries = ("landing_x",)
+    state_space = STATE
+    reward_terms: ClassVar = {
+        "progress": f"(k_now - k_before) / {NUM_BALLS}, k the number of balls held: above a link by less than "
+        f"{PILE_HEIGHT:g} m, below the hand, and slower than {SLOW:g} m/s as seen from the tool",
+        "slack": f"{SLACK_REWARD:g}",
+        "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
+    }
+    success_conditions: ClassVar = {"all_held": f"all {NUM_BALLS} balls are held"}
+    success_steps = HOLD_STEPS
+    failure_condition = "a ball has fallen below the tool, and every other one has, too, or is caught"
 
     run_settings: ClassVar[ByProfile] = {
         "quick": {"steps": 400_000, "tradeoff_scale": 0.01},
@@ -187,27 +228,33 @@ class CatchBalls(Task):
         """Return (count, I) random throws; the balls come down left or right of the hand, equally often."""
         instances = self.instance_space.sample(rng, count)
         distance = rng.uniform(*LANDING_DISTANCE, size=count)
-        instances[:, 0] = HAND_START[0] + distance * np.where(rng.random(count) < 0.5, -1.0, 1.0)
+        instances[:, LANDING] = HAND_START[0] + distance * np.where(rng.random(count) < 0.5, -1.0, 1.0)
         return instances
 
-    def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
-        """Tell which goals (b, I) lie in the middle `fraction` of the places on the left or of those on the right.
+    def in_region(self, instances: Floats) -> Booleans:
+        """Return which goals (b, I) are at a distance from the hand at which balls come down."""
+        near, far = LANDING_DISTANCE
+        distance = np.abs(instances[:, LANDING] - HAND_START[0])
+        inside: Booleans = (near <= distance) & (distance <= far)
+        return inside
 
-        Two patches, after the paper's of fetch cube (ours).
+    def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
+        """Return which goals (b, I) are in the middle `fraction` of the places on the left or of those on the right.
+
+        These are two patches, after the paper's of fetch cube (ours).
         """
         near, far = LANDING_DISTANCE
-        distance = np.abs(instances[:, 0] - HAND_START[0])
+        distance = np.abs(instances[:, LANDING] - HAND_START[0])
         result: Booleans = np.abs(distance - 0.5 * (near + far)) < 0.5 * fraction * (far - near)
         return result
 
     def material(self, designs: Floats) -> Floats:
         """Return the used share of the largest total link length for designs (b, D) in their units."""
-        total: Floats = designs[:, :3].sum(axis=1) / sum(self.design_space.high[:3])
-        return total
+        return chain_material(designs, self.design_space)
 
     def effort(self, controls: Floats) -> Floats:
         """Return the share of the largest speed of the hand for controls (b, C) in [-1, 1]."""
-        speed: Floats = np.abs(controls[:, 0])
+        speed: Floats = np.abs(controls[:, HAND_SPEED])
         return speed
 
     def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
@@ -216,7 +263,9 @@ class CatchBalls(Task):
 
     def script(self) -> Behaviour:
         """Return a script that makes a pan on the side where the balls come down and brings its middle beneath them."""
-        return _Script(self)
+        from ._scripts.catch_balls import CatchBallsScript  # here, since that file reads this one
+
+        return CatchBallsScript(self)
 
     def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
         """Return a simulator of `num_slots` hands with three balls each."""
@@ -243,17 +292,14 @@ class _CatchSimulator(PlanarSimulator):
     def begin(self, slots: Slots, instances: Floats) -> None:
         """Put hands at their start and balls where the throws `instances` (b, I) begin."""
         starts, speeds = throws(instances)
-        self.landing[slots] = instances[:, 0]
+        self.forget(slots)
+        self.landing[slots] = instances[:, LANDING]
         self.velocity[slots] = 0.0
         self.points[slots] = 0.0
         self.held[slots] = False
         self.held_steps[slots] = 0
-        self.reward[slots] = self.outcome[slots] = 0.0
-        self.success[slots] = self.failure[slots] = False
-        self.bodies[slots, :NUM_BALLS, :2] = starts
-        self.bodies[slots, :NUM_BALLS, 2] = speeds
-        self.bodies[slots, :NUM_BALLS, 3] = 0.0
-        self.bodies[slots, NUM_BALLS] = (*HAND_START, 0.0, 0.0)
+        self.bodies[slots, BALL_BODIES] = np.concatenate([starts, speeds], axis=2)
+        self.bodies[slots, TOOL_BODY] = (*HAND_START, 0.0, 0.0)
         self._write_state(slots)
 
     def build(self, slots: Slots, designs: Floats) -> None:
@@ -266,7 +312,7 @@ class _CatchSimulator(PlanarSimulator):
         space = pymunk.Space()
         space.gravity = (0.0, -GRAVITY)
         own_friction = BALL_FRICTION**0.5  # pymunk multiplies the two frictions of a contact.
-        for x, y, velocity_x, velocity_y in self.bodies[slot, :NUM_BALLS].tolist():
+        for x, y, velocity_x, velocity_y in self.bodies[slot, BALL_BODIES].tolist():
             ball = pymunk.Body(1.0, float("inf"))  # Balls slide and do not roll, so they come to rest on a tool.
             ball.position, ball.velocity = (x, y), (velocity_x, velocity_y)
             disc = pymunk.Circle(ball, BALL_RADIUS)
@@ -284,24 +330,29 @@ class _CatchSimulator(PlanarSimulator):
         """Move the hands by `controls` (b, C) for one control step and reward the balls that came to be held."""
         change = MAX_ACCELERATION * self.clock.control_period
         before = self.velocity[slots]
-        velocity = np.clip(controls[:, 0] * MAX_SPEED, before - change, before + change)
+        velocity = np.clip(controls[:, HAND_SPEED] * MAX_SPEED, before - change, before + change)
         self.velocity[slots] = velocity
         for slot, speed in zip(slots.tolist(), velocity.tolist(), strict=True):
             tool = self.tools[slot]
             assert tool is not None, "a tool is built before it is moved"
             tool.velocity = (speed, 0.0)
         self.advance(slots)
-        balls = self.read_bodies(slots)[:, :NUM_BALLS]
-        hand = self.bodies[slots, NUM_BALLS, :2]
-        points = self.points[slots]
-        held = is_held(points, balls[:, :, :2] - hand[:, None], balls[:, :, 2:] - self.bodies[slots, NUM_BALLS:, 2:])
+        bodies, points = self.read_bodies(slots), self.points[slots]
+        balls, hand = bodies[:, BALL_BODIES], bodies[:, TOOL_BODY]
+        from_hand = balls - hand[:, None]
+        held = is_held(points, from_hand[..., PLACE], from_hand[..., VELOCITY])
         steps = np.where(held, self.held_steps[slots] + 1, 0)
         caught = steps >= HOLD_STEPS
-        lost = balls[:, :, 1] < (hand[:, 1] + points[:, :, 1].min(axis=1))[:, None]
-        success = caught.all(axis=1)
-        gained = held.sum(axis=1) - self.held[slots].sum(axis=1)
-        self.reward[slots] = gained / NUM_BALLS + TABLE.slack_reward + SUCCESS_REWARD * success
-        self.success[slots] = success
+        lowest = hand[:, 1] + points[:, :, 1].min(axis=1)
+        lost = balls[:, :, 1] < lowest[:, None]
+        all_held: Booleans = np.all(held, axis=1)
+        self.set_success(slots, HOLD_STEPS, all_held=all_held)
+        self.set_reward(
+            slots,
+            progress=(held.sum(axis=1) - self.held[slots].sum(axis=1)) / NUM_BALLS,
+            slack=SLACK_REWARD,
+            success=SUCCESS_REWARD * self.success[slots],
+        )
         self.failure[slots] = lost.any(axis=1) & (lost | caught).all(axis=1)
         self.outcome[slots] = held.sum(axis=1)
         self.held[slots], self.held_steps[slots] = held, steps
@@ -310,67 +361,31 @@ class _CatchSimulator(PlanarSimulator):
     def mark(self, slot: int, canvas: Canvas) -> None:
         """Draw the hand's rail and the place where the balls come down."""
         x, y = HAND_START.tolist()
-        canvas.segment((x - 5.0, y), (x + 5.0, y), 0.05, COLOURS["scene"])
+        canvas.segment((x - RAIL, y), (x + RAIL, y), 0.05, COLOURS["scene"])
         canvas.circle((self.landing[slot], y), 0.3, COLOURS["goal"])
 
     def _write_state(self, slots: Slots) -> None:
-        hand = self.bodies[slots, NUM_BALLS]
-        balls = self.bodies[slots, :NUM_BALLS]
-        balls[:, :, :2] -= hand[:, None, :2]
-        self.state[slots, 0] = hand[:, 0]
-        self.state[slots, 1] = self.velocity[slots]
-        seen = np.concatenate([balls, self.held[slots][:, :, None]], axis=2)
-        self.state[slots, 2:] = seen.reshape(len(slots), -1)
-
-
-class _Script(Behaviour):
-    """Brings the middle of whatever tool it is given beneath the balls that are still in the air."""
-
-    PAN = (-1.0, 1.0, 1.0, 1.0, 1.0)
-    """Normalised: a short stem, then two long links that make a pan on the right; on the left with other angles."""
-    GAIN = 4.0
-    """Hand's speed per distance, 1/s."""
-
-    def __init__(self, task: CatchBalls) -> None:
-        self.task = task
-
-    def design(self, observation: Singles) -> Singles:
-        """Return a pan on the side where the balls come down."""
-        right = observation[..., self.task.layout.goal] > HAND_START[0]
-        pan = np.array(self.PAN, dtype=np.float32)
-        mirror = np.array([1.0, 1.0, 1.0, -1.0, -1.0], dtype=np.float32)
-        tools: Singles = np.where(right, pan, pan * mirror)
-        return tools
-
-    def act(self, observation: Singles) -> Singles:
-        """Return the hand's velocity, normalised."""
-        seen = np.atleast_2d(observation).astype(np.float64)
-        balls = seen[:, 2 : 2 + 5 * NUM_BALLS].reshape(len(seen), NUM_BALLS, 5)
-        x, y, velocity_x, velocity_y, held = np.moveaxis(balls, 2, 0)
-        in_the_air = (y > 1.0) & (held < 0.5)
-        fall = (velocity_y + np.sqrt(velocity_y**2 + 2.0 * GRAVITY * np.maximum(y, 0.0))) / GRAVITY
-        points = chain_points(self.task.design_space.from_unit(seen[:, self.task.layout.design]), FIRST_LINK_ANGLE)
-        middle = 0.5 * (points[:, :, 0].min(axis=1) + points[:, :, 0].max(axis=1))
-        count = in_the_air.sum(axis=1)
-        way = ((x + velocity_x * fall) * in_the_air).sum(axis=1) / np.maximum(count, 1) - middle
-        control = np.where(count > 0, self.GAIN / MAX_SPEED * way, 0.0)[:, None]
-        result: Singles = np.clip(control, -1.0, 1.0).astype(np.float32)
-        return result if observation.ndim == 2 else result[0]
+        hand, balls = self.bodies[slots, TOOL_BODY, PLACE], self.bodies[slots, BALL_BODIES]
+        self.state[slots, HAND] = hand[:, 0]
+        self.state[slots, HAND_VELOCITY] = self.velocity[slots]
+        from_hand = balls[..., PLACE] - hand[:, None]
+        seen = np.concatenate([from_hand, balls[..., VELOCITY], self.held[slots][:, :, None]], axis=2)  # as in BALL
+        self.state[slots, BALLS] = seen.reshape(len(slots), -1)
 
 
 def throws(instances: Floats) -> tuple[Floats, Floats]:
-    """Return where the balls of `instances` (b, I) start, (b, K, 2), m, and their speeds along x (b, K), m/s.
+    """Return where the balls of `instances` (b, I) start and how fast, (b, K, 2), m and m/s; they start level.
 
     A ball starts so far from its landing place as it flies until it is as high as the hand.
     """
-    offset, height, speed = np.split(instances[:, 1:], 3, axis=1)
+    offset, height, speed = instances[:, OFFSETS], instances[:, HEIGHTS], instances[:, SPEEDS]
     fall = np.sqrt(2.0 / GRAVITY * (height - HAND_START[1]))
-    start = instances[:, :1] + offset - speed * fall
-    return np.stack([start, height], axis=2), speed
+    start = instances[:, LANDING, None] + offset - speed * fall
+    return np.stack([start, height], axis=2), np.stack([speed, np.zeros_like(speed)], axis=2)
 
 
 def is_held(points: Floats, balls: Floats, velocity: Floats) -> Booleans:
-    """Tell which balls (b, K) lie on tools with chain `points` (b, 4, 2).
+    """Return which balls (b, K) are held by tools with chain `points` (b, 4, 2).
 
     `balls` (b, K, 2) are centres, `velocity` (b, K, 2) velocities, both as seen from the hand. What is slow above a
     link and stays so lies on it: nothing else is there that could carry it. Above the hand's height it does not count,

@@ -6,199 +6,279 @@ Shapes: `B` slots, `b` slots a call names, `I` = 2 instance (cup's width and hei
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
-from codesign_bench.studies.corl2023.scenes import BOX_SCENES
 from codesign_bench.task import (
+    OURS,
     Behaviour,
-    Booleans,
     Box,
     ByProfile,
     Floats,
+    Given,
     Quantity,
     Simulator,
-    Singles,
     Slots,
     Soundness,
     Task,
     ToolGraph,
     ToolPart,
+    constants,
 )
-from codesign_bench.task.robot import DeployedSimulator, RobotTrials
+from codesign_bench.task.robot import DeployedSimulator, DeploymentSpec, RobotTrials
 
-from ._bullet import MAX_SLOTS, Boxes, BulletSimulator, Camera, Marks, box_parts, rotation_matrices, rotations_about
+from ._bullet import (
+    BULLET_SCENE,
+    MAX_SLOTS,
+    PLACE,
+    ROTATION,
+    VELOCITY,
+    Boxes,
+    BulletSimulator,
+    Camera,
+    Marks,
+    Triple,
+    box_parts,
+    rotation_matrices,
+    rotations_about,
+)
 from ._carriers import Carrier
-from ._deployed import arm_carrier, gripper_handle
+from ._deployed import (
+    DEPLOYED_SCENE,
+    NEAR_MISS,
+    REAL_ROBOT,
+    TRIAL_STEPS,
+    TRIALS_PER_TOOL,
+    arm_carrier,
+    gripper_handle,
+)
 from ._scene import COLOURS, Clock
 
-TABLE = BOX_SCENES["lift_cup"]
+PAPER = "paper, table of lift cup"
 
-TOOL_START = np.array(TABLE.tool_position_init, dtype=np.float64)
-"""Where the held end of the handle starts, m (paper, table of lift cup); z is measured from the table top (ours)."""
-HANDLE_HALF_EXTENTS = np.array([0.01, 0.05, 0.01])
-"""Of the handle, m (ours; the paper says that it is fixed)."""
-BAR_THICKNESS = 0.02
-"""Of the cross bar, along y and z, m (ours)."""
+TOOL_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([0.0, 1.2, 0.05])
+"""Where the held end of the handle starts; z is measured from the table top (ours)."""
+BOX_MIN: Annotated[Triple, Given("m", PAPER, "box_dimensions_min")] = (0.005, 0.02, 0.01)
+"""Smallest width, length and height of a prong, read as half extents (our reading)."""
+BOX_MAX: Annotated[Triple, Given("m", PAPER, "box_dimensions_max")] = (0.01, 0.1, 0.03)
+"""Largest width, length and height of a prong, read as half extents (our reading)."""
+ANGLE_MIN: Annotated[float, Given("degrees", PAPER, "tool_angle_min")] = -30.0
+"""Smallest tilt of the prongs."""
+ANGLE_MAX: Annotated[float, Given("degrees", PAPER, "tool_angle_max")] = 30.0
+"""Largest tilt of the prongs."""
+HANDLE_HALF_EXTENTS: Annotated[Floats, Given("m", "ours; the paper says that it is fixed")] = np.array(
+    [0.01, 0.05, 0.01]
+)
+"""Of the handle."""
+BAR_THICKNESS: Annotated[float, Given("m", OURS)] = 0.02
+"""Of the cross bar, along y and z."""
 PRONG_START = 2.0 * HANDLE_HALF_EXTENTS[1] + BAR_THICKNESS
-"""Distance of the prongs' rear ends from the held end, along y, m (ours)."""
-TOOL_CLEARANCE = 0.002
-"""The lowest point of a tool stays this far above the table, m (ours)."""
-WORKSPACE = Box.of(held_x=(-0.15, 0.15, "m"), held_y=(1.1, 1.75, "m"), held_z=(0.0, 0.7, "m"))
-"""Where the held end may go (ours); a tool's lowest point limits z further."""
-MAX_MOVE = 0.02
-"""Longest way of the held end in a control step, m (ours): 0.48 m/s, too slow to bat a cup away."""
+"""Distance of the prongs' rear ends from the held end, along y, m."""
+TOOL_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.002
+"""The lowest point of a tool stays this far above the table."""
+WORKSPACE: Annotated[Box, Given("m", OURS)] = Box.of(
+    held_x=(-0.15, 0.15, "m"), held_y=(1.1, 1.75, "m"), held_z=(0.0, 0.7, "m")
+)
+"""Where the held end may go; a tool's lowest point limits z further."""
+MAX_MOVE: Annotated[float, Given("m", OURS, "control_action_scale")] = 0.02
+"""Longest way of the held end in a control step: 0.48 m/s, too slow to bat a cup away; the paper's scale would be
+2.4 m/s."""
 
-CUP_UNIT = 0.18
-"""Width and height of a cup of scale 1, m (ours): rims of all widths fit between prongs of the design space."""
-CUP_START_Y = 1.65
-"""Where cups stand, x being 0, m (ours): no fork reaches a rim at the start."""
-CUP_MASS = 0.2
-"""kg (ours)."""
-WALL = 0.008
-"""Thickness of walls and bottom, m (ours)."""
-RIM_WIDTH = 0.02
-"""How far the rim stands out from the walls, m (ours): the play of a prong between wall and the rim's edge."""
-RIM_THICKNESS = 0.008
-"""m (ours)."""
-WALL_GAP = 0.002
-"""Walls end this high above the bottom's underside, m (ours): a cup on the table then has 4 contacts instead of 20."""
-CUP_FRICTION = 0.25
-"""Of the cup; table and tool have 1, and the engine multiplies (ours)."""
-TABLE_TOP = (-0.5, 0.5), (0.8, 2.4)
-"""Ends of the table along x and y, m (ours)."""
-TABLE_HALF_THICKNESS = 0.1
-"""m (ours)."""
+CUP_UNIT: Annotated[float, Given("m", OURS)] = 0.18
+"""Width and height of a cup of scale 1: rims of all widths fit between prongs of the design space."""
+CUP_WIDTHS: Annotated[tuple[float, float], Given("1", f"{REAL_ROBOT}: range of its real cups")] = (0.3, 0.9)
+"""Smallest and largest scale of a cup's width."""
+CUP_HEIGHTS: Annotated[tuple[float, float], Given("1", f"{REAL_ROBOT}: range of its real cups")] = (0.6, 0.9)
+"""Smallest and largest scale of a cup's height."""
+CUP_START_Y: Annotated[float, Given("m", OURS)] = 1.65
+"""Where cups stand, x being 0: no fork reaches a rim at the start."""
+CUP_MASS: Annotated[float, Given("kg", OURS)] = 0.2
+"""Of a cup."""
+WALL: Annotated[float, Given("m", OURS)] = 0.008
+"""Thickness of walls and bottom."""
+RIM_WIDTH: Annotated[float, Given("m", OURS)] = 0.02
+"""How far the rim stands out from the walls: the play of a prong between wall and the rim's edge."""
+RIM_THICKNESS: Annotated[float, Given("m", OURS)] = 0.008
+"""Of the rim."""
+WALL_GAP: Annotated[float, Given("m", OURS)] = 0.002
+"""Walls end this high above the bottom's underside: a cup on the table then has 4 contacts instead of 20."""
+CUP_FRICTION: Annotated[float, Given("1", OURS)] = 0.25
+"""Of the cup; table and tool have 1, and the engine multiplies."""
+TABLE_TOP: Annotated[tuple[tuple[float, float], tuple[float, float]], Given("m", OURS)] = (-0.5, 0.5), (0.8, 2.4)
+"""Ends of the table along x and y."""
+TABLE_HALF_THICKNESS: Annotated[float, Given("m", OURS)] = 0.1
+"""Of the table."""
 
-SUCCESS_HEIGHT = 0.4
-"""The cup's lowest corner must rise above this, m (paper, appendix "Real Robot Experiment Details")."""
-UPRIGHT = 0.9
-"""Cosine of the tilt up to which a cup is upright (ours): 26 degrees."""
-TIPPED = 0.7
-"""Cosine of the tilt beyond which a cup has tipped over (ours): 46 degrees."""
-FALLEN_HEIGHT = -0.05
-"""A cup whose centre is below this has fallen off the table, m (ours)."""
+SUCCESS_HEIGHT: Annotated[float, Given("m", REAL_ROBOT, "lift_cup_height")] = 0.4
+"""The cup's lowest corner must rise above this."""
+UPRIGHT: Annotated[float, Given("1", OURS)] = 0.9
+"""Cosine of the tilt up to which a cup is upright: 26 degrees."""
+TIPPED: Annotated[float, Given("1", OURS)] = 0.7
+"""Cosine of the tilt beyond which a cup has tipped over: 46 degrees."""
+FALLEN_HEIGHT: Annotated[float, Given("m", OURS)] = -0.05
+"""A cup whose centre is below this has fallen off the table."""
 
-LIFT_WEIGHT = 10.0
-"""Of the height in the reward, 1/m (ours)."""
-FIT_WEIGHT = 4.0
-"""Of the distance between prongs and rim in the reward, 1/m (ours)."""
-FIT_LENGTH = 0.03
-"""Within this distance the prongs count as fitting the rim, m (ours)."""
-PLAY = 0.25 * RIM_WIDTH
-"""Prongs this far from the middle of the rim still fit perfectly, m (ours)."""
-START_POTENTIAL = -1.0
-"""Of every episode's start: the one of prongs 0.25 m away (ours)."""
+LIFT_WEIGHT: Annotated[float, Given("1/m", OURS)] = 10.0
+"""Of the height in the reward."""
+FIT_WEIGHT: Annotated[float, Given("1/m", OURS)] = 4.0
+"""Of the distance between prongs and rim in the reward."""
+FIT_LENGTH: Annotated[float, Given("m", OURS)] = 0.03
+"""Within this distance the prongs count as fitting the rim."""
+PLAY: Annotated[float, Given("m", OURS)] = 0.25 * RIM_WIDTH
+"""Prongs this far from the middle of the rim still fit perfectly."""
+START_POTENTIAL: Annotated[float, Given("1", OURS)] = -1.0
+"""Of every episode's start: the one of prongs 0.25 m away."""
+SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
+"""Added in every control step."""
+SUCCESS_REWARD: Annotated[float, Given("1", PAPER, "success_reward")] = 10.0
+"""Added once, when the cup is lifted."""
 
-ARM_BASE = (0.0, 1.0, 0.3)
-"""Where a robot's base stands, m (ours): 0.3 m above the table and 0.65 m before the cup.
+REAL_CUPS: Annotated[tuple[tuple[float, float], ...], Given("1", REAL_ROBOT, "lift_cup_sizes")] = (
+    (0.3, 0.6),
+    (0.3, 0.9),
+    (0.5, 0.8),
+    (0.9, 0.6),
+)
+"""Scales of width and height of the cups for which the paper's printed tools were designed."""
+ARM_BASE: Annotated[Triple, Given("m", OURS)] = (0.0, 1.0, 0.3)
+"""Where a robot's base stands: 0.3 m above the table and 0.65 m before the cup.
 
-From there a Panda reaches from below the rims up to the lifted cup; the paper does not tell where its own stood.
+From there a Panda reaches from below the rims up to the lifted cup; the paper does not say where its own stood.
 """
 ARM_CAMERA = Camera(eye=(1.5, 1.45, 0.7), target=(0.0, 1.3, 0.42))
 """Sees arm and cup in deployment."""
 
-CLOCK = Clock(steps=TABLE.control_steps_per_action, period=1.0 / 240.0)
-"""Ten physics steps per control step (paper, table of lift cup) of 1/240 s (ours)."""
+HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 150
+"""Time limit."""
+STEPS_PER_CONTROL: Annotated[int, Given("physics steps", PAPER, "control_steps_per_action")] = 10
+"""In a control step."""
+PHYSICS_PERIOD: Annotated[float, Given("s", "PyBullet's own")] = 1.0 / 240.0
+"""Of a physics step."""
+CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
 
 FORK_GRAPH = ToolGraph(num_nodes=4, edges=((0, 1), (1, 2), (1, 3)), parameter_nodes=(1, 2, 2, 2, 2))
 """Handle, cross bar, left and right prong; the right prong is the left one's mirror image and has no own parameters."""
+
+
+(_WIDTH, _LENGTH, _HEIGHT) = ((2.0 * low, 2.0 * high, "m") for low, high in zip(BOX_MIN, BOX_MAX, strict=True))
+DESIGN = Box.of(
+    prong_distance=_LENGTH,  # the paper gives no range for the distance
+    prong_tilt=(float(np.deg2rad(ANGLE_MIN)), float(np.deg2rad(ANGLE_MAX)), "rad"),
+    prong_width=_WIDTH,
+    prong_length=_LENGTH,
+    prong_height=_HEIGHT,
+)
+
+INSTANCE = Box.of(
+    cup_width_scale=(*CUP_WIDTHS, f"{CUP_UNIT:g} m"),
+    cup_height_scale=(*CUP_HEIGHTS, f"{CUP_UNIT:g} m"),
+)
+CUP_WIDTH = INSTANCE.index("cup_width_scale")
+STATE = Box.of(
+    held_x=(WORKSPACE.low[0], WORKSPACE.high[0], "m"),
+    held_y=(WORKSPACE.low[1], WORKSPACE.high[1], "m"),
+    held_z=(WORKSPACE.low[2], WORKSPACE.high[2], "m"),
+    cup_way_x=(-1.0, 1.0, "m"),
+    cup_way_y=(-1.0, 1.0, "m"),
+    cup_way_z=(-1.0, 1.0, "m"),
+    prongs_to_cup_x=(-1.0, 1.0, "m"),
+    prongs_to_cup_y=(-1.0, 1.0, "m"),
+    prongs_to_cup_z=(-1.0, 1.0, "m"),
+    prongs_to_rim_z=(-1.0, 1.0, "m"),
+    left_clearance=(-1.0, 1.0, "m"),
+    right_clearance=(-1.0, 1.0, "m"),
+    cup_x_axis_z=(-1.0, 1.0, "-"),
+    cup_y_axis_z=(-1.0, 1.0, "-"),
+    cup_z_axis_z=(-1.0, 1.0, "-"),
+    cup_y_axis_x=(-1.0, 1.0, "-"),
+    cup_velocity_x=(-5.0, 5.0, "m/s"),
+    cup_velocity_y=(-5.0, 5.0, "m/s"),
+    cup_velocity_z=(-5.0, 5.0, "m/s"),
+)
+HELD, CUP_WAY, CUP_VELOCITY = STATE.group("held_"), STATE.group("cup_way_"), STATE.group("cup_velocity_")
+CUP_HEIGHT, PRONGS_TO_CUP = STATE.index("cup_way_z"), STATE.group("prongs_to_cup_")
+PRONGS_TO_CUP_XY, PRONGS_TO_RIM = STATE.slice("prongs_to_cup_x", "prongs_to_cup_y"), STATE.index("prongs_to_rim_z")
+LEFT_CLEARANCE, RIGHT_CLEARANCE = STATE.index("left_clearance"), STATE.index("right_clearance")
+CUP_AXES_Z, CUP_UPRIGHT = STATE.slice("cup_x_axis_z", "cup_y_axis_z", "cup_z_axis_z"), STATE.index("cup_z_axis_z")
+CUP_TURN = STATE.index("cup_y_axis_x")
 
 
 class LiftCup(Task):
     """Lift a cup of given width and height from the table (paper, appendix "Environment Details").
 
     The tool is a fork: a handle, a cross bar and two prongs. The robot holds the end of the handle, moves it and never
-    turns it. The cup is square, closed at the bottom and has a rim that stands out. It is lifted by prongs that pass on
-    both sides of it, closer together than the edges of its rim: closer, they do not pass the walls; wider, they miss
-    the rim; too short, the cup tips. So the distance of the prongs must match the cup's width, with 20 mm of play on
-    each side, and none serves two cups whose widths differ by more than 40 mm, of 108 mm.
+    turns it. The cup is square, closed at the bottom and has a rim that stands out. Prongs that pass on both sides of
+    it take it under the rim. Prongs closer together than the cup is wide do not pass the walls; prongs further apart
+    than the rim's edges miss it; short prongs, and prongs that hang down, let the cup tip. So the fork must match the
+    cup: each prong has the rim's width of play, and no fork lifts two cups whose widths differ by more than twice that.
 
     Action space
-        Design, 5: distance between the prongs' inner faces, tilt, width, length and height of the prongs (paper; the
-        handle is fixed, both prongs are alike). Control, 3: change of the held end's position, +-0.02 m along x, y and
-        z, at most 0.02 m in all (ours; the paper's +-0.1 m would be 2.4 m/s).
+        Design, 5: distance between the prongs' inner faces (m), tilt (rad), width, length and height of the prongs (m)
+        (paper; the handle is fixed, both prongs are alike). Control, 3: change of the held end's place x, y, z in a
+        control step (m) (paper; range ours); its length is limited, not each entry.
 
     Observation
-        | index | what | unit | range |
-        | --- | --- | --- | --- |
-        | 0, 1, 2 | held end's position x, y, z | m | -0.15 .. 0.15, 1.1 .. 1.75, 0 .. 0.7 |
-        | 3, 4, 5 | cup's way from its start x, y, z | m | -1 .. 1 |
-        | 6, 7, 8 | from the point midway between the prongs to the cup's centre of mass x, y, z | m | -1 .. 1 |
-        | 9 | height of the rim's underside above the prongs' top, at the prongs' middle | m | -1 .. 1 |
-        | 10, 11 | free width between left and right prong and the cup's walls | m | -1 .. 1 |
-        | 12, 13, 14 | vertical parts of the cup's x, y and z axis | - | -1 .. 1 |
-        | 15 | how far the cup's y axis points along x (its turn about the vertical) | - | -1 .. 1 |
-        | 16, 17, 18 | cup's velocity x, y, z | m/s | -5 .. 5 |
-        | 19, 20 | cup's width and height, as scales | - | 0.3 .. 0.9 and 0.6 .. 0.9 |
-
-        followed by the design (5, normalised) and the phase (3). Before there is a tool, 6 to 11 are 0.
+        State, 19: place of the held end, way of the cup from its start, way from the point midway between the prongs to
+        the cup's centre of mass, x, y, z of each (m); height of the rim's underside above the prongs' top at their
+        middle, and free width between each prong and the cup's walls (m); vertical parts of the cup's three axes, and
+        how far its y axis points along x; velocity of the cup x, y, z (m/s). Goal, 2: scales of the cup's width and
+        height. Then the design and the phase. Before there is a tool, all that concerns prongs is 0.
 
     Design space
-        `LiftCup.design_space`; distance 0.04 to 0.2 m (ours, the range of the length), tilt +-30 degrees, positive with
-        the tips up, width 0.01 to 0.02 m, length 0.04 to 0.2 m, height 0.02 to 0.06 m (paper, box dimensions read as
-        half extents).
+        The paper's table gives sizes, read as half extents, PyBullet's own measure (ours), but no range for the
+        distance of the prongs; ours is that of their length. A positive tilt raises the tips; prongs turn about their
+        rear ends, in front of the cross bar. The right prong, node 3, is the left one's mirror image and has no
+        parameters.
 
     Goal space
-        The scale of the cup's width, 0.3 to 0.9, and of its height, 0.6 to 0.9 (the range of the paper's real cups),
-        uniform; times 0.18 m (ours).
+        Scales of the cup's width and height, uniform, over the range of the paper's four real cups.
 
     Reward
-        Change of the potential 10 h - 4 d + f - 0.001 per control step; +10 on success (slack and success reward:
-        paper). h is the height of the cup's lowest corner in m, between 0 and 0.4, and 0 while the cup is not upright.
-        d in m is the mean distance from four points under the rim, two on each side of the cup, to the top edge of that
-        side's prong, 5 mm of it sideways for free; f is the mean of exp(-distance / 0.03 m). The potential starts at -1
-        whatever the tool, so a tool that fits earns its fit in the first step. A return lies below 16.
+        The change of a potential, less the paper's slack, and the paper's bonus on success. The potential grows as
+        prongs come to fit the rim and as the cup is lifted. The four points under the rim are on the left and on the
+        right, in the middle of the rim, a quarter of the width before and behind the cup's centre, and move with the
+        cup. Their distance from the top edge of that side's prong has a part sideways, some of which is free, a part
+        along the prong beyond its ends, and a part in height. The potential starts at the same value whatever the tool,
+        so a tool that fits earns its fit in the first step. An episode's return is below 16.
 
     Starting state
-        Cup at rest at (0, 1.65), held end at (0, 1.2, 0.05) (paper), in m. Tools that would then be less than 2 mm
-        above the table start as much higher (ours).
+        The cup at rest and the held end where the paper's table has it. Tools that would then be too low start as much
+        higher as they need (ours). No fork reaches a rim at the start.
 
     Episode end
-        Success: the cup's lowest corner is higher than 0.4 m (paper) and its axis within 26 degrees of the vertical.
-        Failure: it is tipped by more than 46 degrees, or has fallen off the table. Time limit: 150 control steps
-        (paper) of 1/24 s.
+        Success when the cup's lowest corner is high enough and the cup upright; failure when the cup has tipped over or
+        fallen from the table; or the time limit. The lowest corner follows from the cup's rotation, since the centre of
+        a tipped cup is higher than it looks.
     """
 
     name = "lift_cup"
     title = "Lift cup"
-    horizon = TABLE.max_episode_steps
+    scene: ClassVar = {**BULLET_SCENE, **DEPLOYED_SCENE, **constants(__name__)}
+    horizon = HORIZON
     control_period = CLOCK.control_period
-    design_space = Box.of(
-        prong_distance=(2.0 * TABLE.box_dimensions_min[1], 2.0 * TABLE.box_dimensions_max[1], "m"),
-        prong_tilt=(float(np.deg2rad(TABLE.tool_angle_min[0])), float(np.deg2rad(TABLE.tool_angle_max[0])), "rad"),
-        prong_width=(2.0 * TABLE.box_dimensions_min[0], 2.0 * TABLE.box_dimensions_max[0], "m"),
-        prong_length=(2.0 * TABLE.box_dimensions_min[1], 2.0 * TABLE.box_dimensions_max[1], "m"),
-        prong_height=(2.0 * TABLE.box_dimensions_min[2], 2.0 * TABLE.box_dimensions_max[2], "m"),
-    )
+    design_space = DESIGN
     tool_graph = FORK_GRAPH
     control_space = Box.of(
         move_x=(-MAX_MOVE, MAX_MOVE, "m"), move_y=(-MAX_MOVE, MAX_MOVE, "m"), move_z=(-MAX_MOVE, MAX_MOVE, "m")
     )
-    instance_space = Box.of(cup_width_scale=(0.3, 0.9, "0.18 m"), cup_height_scale=(0.6, 0.9, "0.18 m"))
+    instance_space = INSTANCE
     goal_size = 2
-    state_space = Box.of(
-        held_x=(WORKSPACE.low[0], WORKSPACE.high[0], "m"),
-        held_y=(WORKSPACE.low[1], WORKSPACE.high[1], "m"),
-        held_z=(WORKSPACE.low[2], WORKSPACE.high[2], "m"),
-        cup_way_x=(-1.0, 1.0, "m"),
-        cup_way_y=(-1.0, 1.0, "m"),
-        cup_way_z=(-1.0, 1.0, "m"),
-        prongs_to_cup_x=(-1.0, 1.0, "m"),
-        prongs_to_cup_y=(-1.0, 1.0, "m"),
-        prongs_to_cup_z=(-1.0, 1.0, "m"),
-        prongs_to_rim_z=(-1.0, 1.0, "m"),
-        left_clearance=(-1.0, 1.0, "m"),
-        right_clearance=(-1.0, 1.0, "m"),
-        cup_x_axis_z=(-1.0, 1.0, "-"),
-        cup_y_axis_z=(-1.0, 1.0, "-"),
-        cup_z_axis_z=(-1.0, 1.0, "-"),
-        cup_y_axis_x=(-1.0, 1.0, "-"),
-        cup_velocity_x=(-5.0, 5.0, "m/s"),
-        cup_velocity_y=(-5.0, 5.0, "m/s"),
-        cup_velocity_z=(-5.0, 5.0, "m/s"),
+    state_space = STATE
+    reward_terms: ClassVar = {
+        "progress": f"change of {LIFT_WEIGHT:g} h - {FIT_WEIGHT:g} d + f, starting from {START_POTENTIAL:g}; h the "
+        f"height of the cup's lowest corner, m, at most {SUCCESS_HEIGHT:g} and 0 while the cup is not upright; d the "
+        f"mean distance of four points under the rim from the prongs, m, {PLAY:g} m of it sideways for free; f the "
+        f"mean of exp(-distance / {FIT_LENGTH:g} m)",
+        "slack": f"{SLACK_REWARD:g}",
+        "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
+    }
+    success_conditions: ClassVar = {
+        "lifted": f"the cup's lowest corner is higher than {SUCCESS_HEIGHT:g} m",
+        "upright": f"the cup's axis is within {np.rad2deg(np.arccos(UPRIGHT)):.0f} degrees of the vertical",
+    }
+    failure_condition = (
+        f"the cup is tipped by more than {np.rad2deg(np.arccos(TIPPED)):.0f} degrees, or has fallen off the table"
     )
 
     run_settings: ClassVar[ByProfile] = {
@@ -223,28 +303,40 @@ class LiftCup(Task):
         """Return the handle, cross bar and prongs of the tool of a design (D,) in its units."""
         return box_parts(fork_boxes(design[None]))
 
-    def gripper_handle(self) -> tuple[ToolPart, ...]:
-        """Return the bar and the post that the arm's fingers hold."""
-        return gripper_handle()
-
     def script(self) -> Behaviour:
         """Return a script that puts the prongs beside the cup and lifts."""
-        return _Script(self)
+        from ._scripts.lift_cup import LiftCupScript  # here, since that file reads this one
+
+        return LiftCupScript(self)
 
     def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
         """Return a simulator of `num_slots` cups and forks."""
         return _LiftCupSimulator(num_slots, self.state_space.size, CLOCK.refined(refinement))
 
-    def robot_trials(self) -> RobotTrials:
-        """Return the four cups of the paper's tools; there is no grid."""
-        return RobotTrials(np.array(REAL_ROBOT.lift_cup_sizes), np.zeros((0, 0, 2)), SUCCESS_HEIGHT)
+    @property
+    def deployment(self) -> DeploymentSpec:
+        """The paper's trials on a real robot, on a simulated arm."""
+        return DeploymentSpec(_robot_trials(), _on_an_arm, gripper_handle)
 
-    def make_deployed_simulator(self, num_slots: int, arm: str) -> DeployedSimulator:
-        """Return a simulator of `num_slots` cups whose forks are held by `arm`, seen from the side."""
-        carrier = arm_carrier(arm, ARM_BASE, CLOCK)
-        simulator = _LiftCupSimulator(num_slots, self.state_space.size, CLOCK, carrier)
-        simulator.camera = ARM_CAMERA
-        return simulator
+
+def _robot_trials() -> RobotTrials:
+    """Return the four cups of the paper's tools; there is no grid."""
+    return RobotTrials(
+        own=np.array(REAL_CUPS),
+        grid=np.zeros((0, 0, INSTANCE.size)),
+        success_outcome=SUCCESS_HEIGHT,
+        near_miss=NEAR_MISS,
+        trials_per_tool=TRIALS_PER_TOOL,
+        max_steps=TRIAL_STEPS,
+    )
+
+
+def _on_an_arm(num_slots: int, arm: str) -> DeployedSimulator:
+    """Return a simulator of `num_slots` cups whose forks are held by `arm`, seen from the side."""
+    carrier = arm_carrier(arm, ARM_BASE, CLOCK)
+    simulator = _LiftCupSimulator(num_slots, STATE.size, CLOCK, carrier)
+    simulator.camera = ARM_CAMERA
+    return simulator
 
 
 def _volume(designs: Floats) -> Floats:
@@ -348,7 +440,7 @@ class _LiftCupSimulator(BulletSimulator):
         self.centre_height = np.zeros(num_slots)
         """(B,) of the cup's centre of mass above its underside, m."""
         self.cup_start = np.zeros((num_slots, 3))
-        self.designs = np.zeros((num_slots, 5))
+        self.designs = np.zeros((num_slots, DESIGN.size))
         self.prong_middle = np.zeros((num_slots, 3))
         self.lowest_hold = np.zeros(num_slots)
         """(B,) smallest allowed height of the held end, m."""
@@ -357,6 +449,7 @@ class _LiftCupSimulator(BulletSimulator):
 
     def begin(self, slots: Slots, instances: Floats) -> None:
         """Put cups of the sizes that `instances` (b, I) say on their tables."""
+        self.forget(slots)
         size = CUP_UNIT * instances
         cups = _Cups(*size.T)
         self.size[slots] = size
@@ -368,12 +461,10 @@ class _LiftCupSimulator(BulletSimulator):
         self._cups.update(zip(slots.tolist(), zip(*parts, strict=True), strict=True))
         self.restart(slots)
         self.potential[slots] = START_POTENTIAL
-        self.reward[slots] = self.outcome[slots] = 0.0
-        self.success[slots] = self.failure[slots] = False
         self.pose[slots] = TOOL_START
         self.state[slots] = 0.0
-        self.state[slots, :3] = TOOL_START
-        self.state[slots, 14] = 1.0
+        self.state[slots, HELD] = TOOL_START
+        self.state[slots, CUP_UPRIGHT] = 1.0
 
     def build_scene(self, slot: int) -> list[int]:
         """Add table and cup."""
@@ -414,8 +505,11 @@ class _LiftCupSimulator(BulletSimulator):
         self.read_tools(slots)
         self.read_bodies(slots)
         potential = self._observe(slots)
-        self.reward[slots] = (
-            potential - self.potential[slots] + TABLE.slack_reward + TABLE.success_reward * self.success[slots]
+        self.set_reward(
+            slots,
+            progress=potential - self.potential[slots],
+            slack=SLACK_REWARD,
+            success=SUCCESS_REWARD * self.success[slots],
         )
         self.potential[slots] = potential
 
@@ -428,13 +522,14 @@ class _LiftCupSimulator(BulletSimulator):
         """Write state, outcome and both ends; return the reward's potential (b,)."""
         held, cup = self.pose[slots], self.bodies[slots, 0]
         width, height = self.size[slots].T
-        place, turn = cup[:, :3], rotation_matrices(cup[:, 3:7])
+        place, turn = cup[:, PLACE], rotation_matrices(cup[:, ROTATION])
         axes = turn[:, 2]
+        # Corners of the underside are at (+-width / 2, +-width / 2, -centre_height); the lowest has both signs down.
         lowest = place[:, 2] - 0.5 * width * np.abs(axes[:, :2]).sum(axis=1) - self.centre_height[slots] * axes[:, 2]
         upright = axes[:, 2] > UPRIGHT
         lifted = np.where(upright, np.maximum(lowest, 0.0), 0.0)
         self.outcome[slots] = lifted
-        self.success[slots] = lifted > SUCCESS_HEIGHT
+        self.set_success(slots, lifted=lowest > SUCCESS_HEIGHT, upright=upright)
         self.failure[slots] = (axes[:, 2] < TIPPED) | (place[:, 2] < FALLEN_HEIGHT)
 
         middle = held + self.prong_middle[slots]
@@ -442,15 +537,15 @@ class _LiftCupSimulator(BulletSimulator):
         prong_top = middle[:, 2] + 0.5 * prong_height / np.cos(tilt)
         rim = height - RIM_THICKNESS - self.centre_height[slots]
         state = self.state
-        state[slots, 0:3] = held
-        state[slots, 3:6] = place - self.cup_start[slots]
-        state[slots, 6:9] = place - middle
-        state[slots, 9] = place[:, 2] + rim - prong_top
-        state[slots, 10] = place[:, 0] - held[:, 0] + 0.5 * (distance - width)
-        state[slots, 11] = held[:, 0] - place[:, 0] + 0.5 * (distance - width)
-        state[slots, 12:15] = axes
-        state[slots, 15] = turn[:, 0, 1]
-        state[slots, 16:19] = cup[:, 7:10]
+        state[slots, HELD] = held
+        state[slots, CUP_WAY] = place - self.cup_start[slots]
+        state[slots, PRONGS_TO_CUP] = place - middle
+        state[slots, PRONGS_TO_RIM] = place[:, 2] + rim - prong_top
+        state[slots, LEFT_CLEARANCE] = place[:, 0] - held[:, 0] + 0.5 * (distance - width)
+        state[slots, RIGHT_CLEARANCE] = held[:, 0] - place[:, 0] + 0.5 * (distance - width)
+        state[slots, CUP_AXES_Z] = axes
+        state[slots, CUP_TURN] = turn[:, 0, 1]
+        state[slots, CUP_VELOCITY] = cup[:, VELOCITY]
 
         misfit = self._misfit(slots, place, turn, rim)
         fit = np.exp(-misfit / FIT_LENGTH) - FIT_WEIGHT * misfit
@@ -478,39 +573,3 @@ class _LiftCupSimulator(BulletSimulator):
         points[..., 2] -= top
         result: Floats = np.linalg.norm(points, axis=2)
         return result
-
-
-class _Script(Behaviour):
-    """Brings the prongs' middle, or the cross bar, up to the cup with the prongs at its sides; then lifts."""
-
-    TOLERANCE = 0.004
-    """The held end this near to its aim lifts, m."""
-    BAR_DISTANCE = 0.005
-    """Free way that the cross bar leaves before the cup's wall, m."""
-    LIFTED = 0.003
-    """A cup this high is on its way up, whatever its place, m."""
-    PRONGS: ClassVar[tuple[float, ...]] = (0.0, 0.015, 0.2, 0.04)
-    """Tilt (rad), width, length and height (m) of the script's own tools."""
-
-    def __init__(self, task: LiftCup) -> None:
-        self.task = task
-
-    def design(self, observation: Singles) -> Singles:
-        """Return long level prongs whose inner faces pass under the middle of the rim."""
-        seen = np.atleast_2d(observation)
-        width = CUP_UNIT * seen[:, self.task.layout.goal][:, 0]
-        designs = np.column_stack([width + RIM_WIDTH, np.tile(self.PRONGS, (len(seen), 1))])
-        result: Singles = self.task.design_space.to_unit(designs).astype(np.float32)
-        return result if observation.ndim == 2 else result[0]
-
-    def act(self, observation: Singles) -> Singles:
-        """Return the held end's move, normalised."""
-        seen = np.atleast_2d(observation).astype(np.float64)
-        _, tilt, _, length, _ = self.task.design_space.from_unit(seen[:, self.task.layout.design]).T
-        width = CUP_UNIT * seen[:, self.task.layout.goal][:, 0]
-        short_of_cup = np.maximum(0.0, 0.5 * width + self.BAR_DISTANCE - 0.5 * length * np.cos(tilt))
-        way = seen[:, 6:8] - np.column_stack([0.0 * width, short_of_cup])
-        there: Booleans = (np.abs(way) < self.TOLERANCE).all(axis=1) | (seen[:, 5] > self.LIFTED)
-        moves = np.column_stack([way / MAX_MOVE, there])
-        result: Singles = np.clip(moves, -1.0, 1.0).astype(np.float32)
-        return result if observation.ndim == 2 else result[0]

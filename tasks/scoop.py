@@ -9,225 +9,261 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pymunk
 
-from codesign_bench.studies.corl2023.scenes import PLANAR_SCENES
 from codesign_bench.task import (
+    OURS,
     Behaviour,
     Booleans,
     Box,
     ByProfile,
     Floats,
+    Given,
     Physics,
     Quantity,
     Simulator,
-    Singles,
     Slots,
     Soundness,
     Task,
     ToolPart,
+    constants,
 )
 
 from ._planar import (
     CHAIN_GRAPH,
     COLOURS,
+    PLACE,
+    VELOCITY,
     Canvas,
     Clock,
     PlanarSimulator,
     View,
     chain_design_space,
+    chain_material,
     chain_parts,
     chain_points,
     overlap,
 )
 
-TABLE = PLANAR_SCENES["scoop"]
+PAPER = "paper, table of scoop"
+TEXT = 'paper, appendix "Environment Details"'
 
-TOOL_START = np.array(TABLE.tool_position_init, dtype=np.float64)
-"""Where the tool starts, m (paper, table of scoop): x of its first joint and y of its lowest point (our reading)."""
-START_SHIFT = 0.4
-"""The first joint starts up to this far to the left or right of there, m (ours)."""
-FIRST_LINK_ANGLE = -np.pi / 3.0
-"""The first link, the handle, points down to the right; the others curl up and make a ladle, rad (ours)."""
-LINK_HALF_WIDTH = 0.12
-"""Half the thickness of a link, m (ours): a fifth of a ball's radius, so that a tool takes little room in the pile."""
-TOOL_MASS = 8.0
-"""kg (ours); its centre is the first joint."""
-TOOL_MOMENT = 80.0
-"""Moment of inertia about the first joint, kg m^2 (ours)."""
-TOOL_FRICTION = 1.0
-"""Of the links' surface (ours); pymunk multiplies the two frictions of a contact."""
+TOOL_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([15.0, 10.0])
+"""Where the tool starts: x of its first joint and y of its lowest point (our reading)."""
+START_SHIFT: Annotated[float, Given("m", OURS)] = 0.4
+"""The first joint starts up to this far to the left or right of there."""
+LENGTH_INIT: Annotated[tuple[float, float, float], Given("m", PAPER, "tool_length_init")] = (6.0, 3.0, 3.0)
+"""Of the links, from which the design space is made: length = initial length (1 + ratio)."""
+LENGTH_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_length_ratio")] = (-0.7, 0.2)
+"""Range of a length's ratio."""
+ANGLE_SCALE: Annotated[float, Given("degrees", PAPER, "tool_angle_scale")] = 90.0
+"""Angle of ratio 1: angle = scale * ratio."""
+ANGLE_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_angle_ratio")] = (-0.1, 0.7)
+"""Range of an angle's ratio."""
+FIRST_LINK_ANGLE: Annotated[float, Given("rad", OURS)] = -np.pi / 3.0
+"""The first link, the handle, points down to the right; the others curl up and make a ladle."""
+LINK_HALF_WIDTH: Annotated[float, Given("m", OURS)] = 0.12
+"""Half the thickness of a link: a fifth of a ball's radius, so that a tool takes little room in the pile."""
+TOOL_MASS: Annotated[float, Given("kg", OURS)] = 8.0
+"""Of the tool; its centre is the first joint."""
+TOOL_MOMENT: Annotated[float, Given("kg m^2", OURS)] = 80.0
+"""Moment of inertia about the first joint."""
+TOOL_FRICTION: Annotated[float, Given("1", OURS)] = 1.0
+"""Of the links' surface; pymunk multiplies the two frictions of a contact."""
 
-HAND_FORCE = 600.0
-"""The hand moves the tool with at most this force, N (ours): an unstoppable tool would shoot balls out of the pile."""
-HAND_TORQUE = 2400.0
-"""The hand turns the tool with at most this torque, N m (ours)."""
-MAX_SPEED = 1.5
-"""Largest speed of the first joint along each axis, m/s (ours): out of the pile takes about 18 of the 30 steps."""
-MAX_ACCELERATION = 3.0
-"""The hand's velocity along an axis changes at most this fast, m/s^2 (ours): balls can hardly be shaken off."""
-MAX_TURN = 0.3
-"""Largest angular velocity of the tool, rad/s (ours)."""
-MAX_TILT = 0.1
-"""The hand tilts the tool by at most this from its start, rad (ours): less than it takes to make balls slide."""
+HAND_FORCE: Annotated[float, Given("N", OURS)] = 600.0
+"""The hand moves the tool with at most this force: an unstoppable tool would shoot balls out of the pile."""
+HAND_TORQUE: Annotated[float, Given("N m", OURS)] = 2400.0
+"""The hand turns the tool with at most this torque."""
+MAX_SPEED: Annotated[float, Given("m/s", OURS)] = 1.5
+"""Largest speed of the first joint along each axis: out of the pile takes about 18 of the 30 steps."""
+MAX_ACCELERATION: Annotated[float, Given("m/s^2", OURS)] = 3.0
+"""The hand's velocity along an axis changes at most this fast: balls can hardly be shaken off."""
+MAX_TURN: Annotated[float, Given("rad/s", OURS)] = 0.3
+"""Largest angular velocity of the tool."""
+MAX_TILT: Annotated[float, Given("rad", OURS)] = 0.1
+"""The hand tilts the tool by at most this from its start: less than it takes to make balls slide."""
 
-NUM_BALLS = 40
-"""(paper, appendix "Environment Details")."""
-BALL_RADIUS = 0.6
-"""m (ours)."""
-BALL_MASS = float(np.pi * BALL_RADIUS**2)
-"""kg: 1 kg/m^2 (scale of the first author's early scenes)."""
-BALL_FRICTION = 0.2
-"""Of the balls' surface (ours). Balls do not turn, so they never roll: they rest on slopes of up to 11 degrees."""
-WALL_FRICTION = 0.5
-"""Of floor and walls (ours)."""
-GRAVITY = 10.0
-"""m/s^2 (ours)."""
-DAMPING = 0.5
-"""Share of its velocity that a body keeps over 1 s (ours); nothing falls faster than gravity / ln 2 = 14.4 m/s."""
+NUM_BALLS: Annotated[int, Given("balls", TEXT)] = 40
+"""In the reservoir."""
+BALL_RADIUS: Annotated[float, Given("m", OURS)] = 0.6
+"""Of a ball."""
+BALL_DENSITY: Annotated[float, Given("kg/m^2", "scale of the first author's early scenes")] = 1.0
+"""Of a ball."""
+BALL_MASS = float(np.pi * BALL_RADIUS**2) * BALL_DENSITY
+BALL_FRICTION: Annotated[float, Given("1", OURS)] = 0.2
+"""Of the balls' surface. Balls do not turn, so they never roll: they rest on slopes of up to 11 degrees."""
+WALL_FRICTION: Annotated[float, Given("1", OURS)] = 0.5
+"""Of floor and walls."""
+GRAVITY: Annotated[float, Given("m/s^2", OURS)] = 10.0
+"""Of the scene."""
+DAMPING: Annotated[float, Given("1", OURS)] = 0.5
+"""Share of its velocity that a body keeps over 1 s; nothing falls faster than gravity / ln 2 = 14.4 m/s."""
 
-CLEARANCE = 2.0 * BALL_RADIUS + LINK_HALF_WIDTH + 0.08
-"""Every joint and end of the tool keeps this far from floor and walls, m (ours): a ball fits between unsqueezed."""
-FLOOR = float(TOOL_START[1]) - CLEARANCE
-"""y of the floor, m (ours): tools start as low as they may go."""
-RESERVOIR = (9.5, 24.0)
-"""x of the reservoir's walls, m (ours): room for the widest tool at every start."""
-RIM = 14.0
-"""y of the upper ends of these walls, m (ours): above the piles, which are about 4.8 m deep."""
-YARD = (6.0, 27.5)
-"""x of the outer walls, which keep spilled balls in the picture, m (ours)."""
-WALL_HALF_WIDTH = 0.5
-"""Half the thickness of floor and walls, m (ours)."""
-LINE = 15.0
-"""A ball whose centre is above this is out of the reservoir, y in m (ours): 1 m above the rim."""
-CLEAR = LINE - BALL_RADIUS - LINK_HALF_WIDTH
-"""A tool whose lowest point is above this is clear: every ball that rests on it is out, y in m."""
-CEILING = CLEAR + 0.5
-"""The hand lifts the tool's lowest point no higher than this, y in m (ours)."""
+CLEARANCE: Annotated[float, Given("m", OURS)] = 2.0 * BALL_RADIUS + LINK_HALF_WIDTH + 0.08
+"""Every joint and end of the tool keeps this far from floor and walls: a ball fits between unsqueezed."""
+FLOOR: Annotated[float, Given("m", OURS)] = float(TOOL_START[1]) - CLEARANCE
+"""y of the floor: tools start as low as they may go."""
+RESERVOIR: Annotated[tuple[float, float], Given("m", OURS)] = (9.5, 24.0)
+"""x of the reservoir's walls: room for the widest tool at every start."""
+RIM: Annotated[float, Given("m", OURS)] = 14.0
+"""y of the upper ends of these walls: above the piles, which are about 4.8 m deep."""
+YARD: Annotated[tuple[float, float], Given("m", OURS)] = (6.0, 27.5)
+"""x of the outer walls, which keep spilled balls in the picture."""
+WALL_HALF_WIDTH: Annotated[float, Given("m", OURS)] = 0.5
+"""Half the thickness of floor and walls."""
+LINE: Annotated[float, Given("m", OURS)] = 15.0
+"""A ball whose centre is above this y is out of the reservoir: 1 m above the rim."""
+CLEAR: Annotated[float, Given("m", OURS)] = LINE - BALL_RADIUS - LINK_HALF_WIDTH
+"""A tool whose lowest point is above this y is clear: every ball that rests on it is out."""
+CEILING: Annotated[float, Given("m", OURS)] = CLEAR + 0.5
+"""The hand lifts the tool's lowest point no higher than this y."""
 
-GOAL_NUMBERS = (1, 7)
-"""Smallest and largest wanted number of balls (paper, appendix "Environment Details")."""
-REST_SPEED = 0.3
-"""A ball on the tool is at rest when it moves slower than this relative to the tool, m/s (ours)."""
-HELD_STEPS = 3
-"""Control steps in a row for which the wanted number must be held at rest (ours)."""
-NUMBER_EXPONENT = 1.5
-"""How sharply progress prefers the wanted number (ours)."""
-SUCCESS_REWARD = 1.0
-"""Added once, when the wanted number is held (ours; the paper lists one for its 3D tasks only)."""
+GOAL_NUMBERS: Annotated[tuple[int, int], Given("balls", TEXT)] = (1, 7)
+"""Smallest and largest wanted number of balls."""
+REST_SPEED: Annotated[float, Given("m/s", OURS)] = 0.3
+"""A ball on the tool is at rest when it moves slower than this relative to the tool."""
+HELD_STEPS: Annotated[int, Given("control steps", OURS)] = 3
+"""How long in a row the wanted number must be held at rest."""
+NUMBER_EXPONENT: Annotated[float, Given("1", OURS)] = 1.5
+"""How sharply progress prefers the wanted number."""
+SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
+"""Added in every control step."""
+SUCCESS_REWARD: Annotated[float, Given("1", "ours; the paper lists one for its 3D tasks only")] = 1.0
+"""Added once, when the wanted number is held."""
 
-NUM_PILES = 32
-"""Different piles (ours)."""
-PILE_SEED = 40
-"""Seed of the places from which balls fall into the piles (ours)."""
-PILE_STEPS = 240
-"""Physics steps in which a pile comes to rest (ours)."""
+NUM_PILES: Annotated[int, Given("piles", OURS)] = 32
+"""Different piles."""
+PILE_SEED: Annotated[int, Given("1", OURS)] = 40
+"""Seed of the places from which balls fall into the piles."""
+PILE_STEPS: Annotated[int, Given("physics steps", OURS)] = 240
+"""In which a pile comes to rest."""
 HEAP_COLUMNS = np.linspace(RESERVOIR[0] + BALL_RADIUS, RESERVOIR[1] - BALL_RADIUS, 11)
 """x of the columns in which balls lie that make room for the tool, m (ours): balls in neighbouring ones are apart."""
-GAP = 0.02
-"""Balls that make room lie this far above others at least, and no ball starts closer to the tool, m (ours)."""
+GAP: Annotated[float, Given("m", OURS)] = 0.02
+"""Balls that make room lie at least this far above others, and no ball starts closer to the tool."""
 
-CLOCK = Clock(steps=TABLE.control_steps_per_action, period=1.0 / 30.0)
-"""Physics steps per control step (paper, table of scoop), each of 1/30 s (ours)."""
-ITERATIONS = 8
-"""Of the contact solver in every physics step (ours)."""
-MAX_BALL_SPEED = 12.0
-"""No ball is ever faster, m/s (ours), and none is hit deeper than it moves in a physics step; a million random control
-steps saw 10.3 m/s and 0.35 m."""
-SLOP = 0.02
-"""Overlap of two bodies that the contact solver leaves alone, m (ours)."""
+HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 30
+"""Time limit."""
+STEPS_PER_CONTROL: Annotated[int, Given("physics steps", PAPER, "control_steps_per_action")] = 5
+"""In a control step."""
+PHYSICS_PERIOD: Annotated[float, Given("s", OURS)] = 1.0 / 30.0
+"""Of a physics step."""
+CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
+ITERATIONS: Annotated[int, Given("1", OURS)] = 8
+"""Of the contact solver in every physics step."""
+MAX_BALL_SPEED: Annotated[float, Given("m/s", OURS)] = 12.0
+"""No ball is ever faster, and none is hit deeper than it moves in a physics step; a million random control steps saw
+10.3 m/s and 0.35 m."""
+SLOP: Annotated[float, Given("m", OURS)] = 0.02
+"""Overlap of two bodies that the contact solver leaves alone."""
+
+
+CONTROL = Box.of(
+    velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"),
+    velocity_y=(-MAX_SPEED, MAX_SPEED, "m/s"),
+    angular_velocity=(-MAX_TURN, MAX_TURN, "rad/s"),
+)
+MOVE, MOVE_UP = CONTROL.slice("velocity_x", "velocity_y"), CONTROL.index("velocity_y")
+TURN = CONTROL.index("angular_velocity")
+INSTANCE = Box.of(
+    wanted=(*GOAL_NUMBERS, "balls"), pile=(0, NUM_PILES - 1, ""), start_shift=(-START_SHIFT, START_SHIFT, "m")
+)
+WANTED, PILE, SHIFT = INSTANCE.index("wanted"), INSTANCE.index("pile"), INSTANCE.index("start_shift")
+STATE = Box.of(
+    joint_1_x=(0.0, 40.0, "m"),
+    joint_1_y=(0.0, 40.0, "m"),
+    tilt=(-1.0, 1.0, "rad"),
+    lowest_y=(0.0, 40.0, "m"),
+    velocity_x=(-20.0, 20.0, "m/s"),
+    velocity_y=(-20.0, 20.0, "m/s"),
+    angular_velocity=(-10.0, 10.0, "rad/s"),
+    held=(0.0, NUM_BALLS, "balls"),
+    held_less_wanted=(-NUM_BALLS, NUM_BALLS, "balls"),
+    held_steps=(0.0, HELD_STEPS, "steps"),
+    joint_1_to_joint_2_x=(-10.0, 10.0, "m"),
+    joint_1_to_joint_2_y=(-10.0, 10.0, "m"),
+    joint_1_to_tip_x=(-10.0, 10.0, "m"),
+    joint_1_to_tip_y=(-10.0, 10.0, "m"),
+    **{f"wants_{number}": (0.0, 1.0, "") for number in range(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)},
+)
+JOINT, JOINT_VELOCITY = STATE.slice("joint_1_x", "joint_1_y"), STATE.slice("velocity_x", "velocity_y")
+TILT, ANGULAR_VELOCITY, LOWEST = STATE.index("tilt"), STATE.index("angular_velocity"), STATE.index("lowest_y")
+HELD, HELD_LESS_WANTED, HELD_FOR = (STATE.index(name) for name in ("held", "held_less_wanted", "held_steps"))
+SHAPE, WANTS = STATE.group("joint_1_to_"), STATE.group("wants_")
+
+BALL_BODIES, TOOL_BODY = slice(0, NUM_BALLS), NUM_BALLS
+"""Rows of `PlanarSimulator.bodies`; the place of a tool is that of its first joint."""
 
 
 class Scoop(Task):
     """Scoop a wanted number of balls out of a reservoir (paper, appendix "Environment Details").
 
-    Seen from the side. The tool is a chain of three links: a handle and two more that curl up into a ladle. It starts
-    inside the pile. The hand moves it gently and tilts it a little, with limited force. It can hardly shake or pour
-    balls off, and sees them only once they are out, so the number of balls that stay on the tool is decided by its
-    shape: a deep or long ladle for many, a short one for few.
+    Seen from the side, a robot holds a ladle, a chain of three links: a handle and two more that curl up behind it. The
+    ladle starts inside the pile. The hand moves it gently and tilts it a little, with limited force. It can hardly
+    shake or pour balls off, and the observation shows how many there are only once they are out. So the number of balls
+    that stay on the tool is decided by its shape: a deep or long ladle for many, a short one for few.
 
     Action space
-        Design, 5: lengths of three links, 1.8 to 7.2 m, 0.9 to 3.6 m and 0.9 to 3.6 m, and the two angles between them,
-        -9 to 63 degrees (paper, table of scoop). Control, 3: velocity of the first joint, +-1.5 m/s along x and y,
-        and angular velocity, +-0.3 rad/s (ranges ours). The velocity changes by at most 3 m/s^2, the tool tilts by at
-        most 0.1 rad and keeps 1.4 m from floor and walls (ours).
+        Design, 5: lengths of the three links (m) and the two angles between them (rad) (paper). Control, 3: velocity of
+        the first joint along x and y (m/s) and angular velocity (rad/s) (ours). Acceleration and tilt are limited, and
+        the tool keeps away from floor and walls (ours).
 
     Observation
-        | index | what | unit | range |
-        | --- | --- | --- | --- |
-        | 0, 1 | first joint's position x, y | m | 0 .. 40 |
-        | 2 | tilt | rad | -1 .. 1 |
-        | 3 | y of the tool's lowest point | m | 0 .. 40 |
-        | 4, 5 | first joint's velocity x, y | m/s | -20 .. 20 |
-        | 6 | angular velocity | rad/s | -10 .. 10 |
-        | 7 | balls held out of the reservoir | balls | 0 .. 40 |
-        | 8 | the same less the wanted number | balls | -40 .. 40 |
-        | 9 | control steps in a row with the wanted number at rest | steps | 0 .. 3 |
-        | 10 - 13 | from first joint to second joint and to tip x, y | m | -10 .. 10 |
-        | 14 - 20 | whether 1, 2, ..., 7 balls are wanted | | 0 .. 1 |
-        | 21 | wanted number | balls | 1 .. 7 |
-
-        followed by the design (5, normalised) and the phase (3).
+        State, 21: place of the first joint (m), tilt (rad), height of the tool's lowest point (m), velocity (m/s) and
+        angular velocity (rad/s); balls held out of the reservoir, the same less the wanted number, control steps for
+        which success has held; the ways from the first joint to the second and to the tip (m); and which number is
+        wanted, one entry for each. Goal, 1: the wanted number. Then the design and the phase.
 
     Design space
-        `Scoop.design_space`; length = 6, 3, 3 m (1 + r), r in [-0.7, 0.2]; angle = 90 degrees r, r in [-0.1, 0.7].
+        Length = initial length (1 + ratio), angle = scale * ratio (our reading of the paper's table). The table has
+        three angles; a chain of three links has two joints, and the third angle is not used.
 
     Goal space
-        1 to 7 balls of 40 (paper), all alike often (ours).
+        Whole numbers of balls (paper), each equally often (ours). An instance also holds which pile there is and how
+        far to the left or right the tool starts; policies do not see these two.
 
     Reward
-        Change of h (min(1 + k, 1 + n) / max(1 + k, 1 + n))^1.5 - 0.001 per control step, n the wanted number, k the
-        number of balls vertically above the tool, h the share of the way up, from y = 10 m to 14.78 m, that the tool's
-        lowest point has made; +1 on success. An episode's return lies below 2.
+        The change of a potential that grows as the tool is lifted and is the larger, the nearer the number of balls
+        above it is to the wanted one; less the paper's slack, and a bonus on success. Lowering the tool loses what
+        lifting it earns. An episode's return is below 2.
 
     Starting state
-        One of 32 piles, nearly at rest; the tool upright in it, its first joint at x = 15 m (paper) +-0.4 m and its
-        lowest point at y = 10 m (paper; our reading), 1.4 m above the floor. Balls that would overlap it lie on top of
-        the pile and fall into place in the first second (ours).
+        A pile nearly at rest and the tool upright in it, at the place of the paper's table (our reading of it). Balls
+        that would overlap the tool are put on top of the pile and fall into place within the first second (ours).
 
     Episode end
-        Success: for 3 control steps the tool is clear of the reservoir, that is, its lowest point is above y = 14.28 m,
-        and as many balls as wanted are vertically above it, all slower than 0.3 m/s relative to it. Time limit: 30
-        control steps of 1/6 s, five physics steps each (30 and five are the paper's).
+        Success when the tool is clear of the reservoir and as many balls as wanted have been at rest on it for a few
+        control steps, or the time limit.
     """
 
     name = "scoop"
     title = "Scoop"
-    horizon = TABLE.max_episode_steps
+    scene: ClassVar = constants(__name__)
+    horizon = HORIZON
     control_period = CLOCK.control_period
-    design_space = chain_design_space(
-        TABLE.tool_length_init, TABLE.tool_length_ratio, TABLE.tool_angle_scale, TABLE.tool_angle_ratio
-    )
+    design_space = chain_design_space(LENGTH_INIT, LENGTH_RATIO, ANGLE_SCALE, ANGLE_RATIO)
     tool_graph = CHAIN_GRAPH
-    control_space = Box.of(
-        velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"),
-        velocity_y=(-MAX_SPEED, MAX_SPEED, "m/s"),
-        angular_velocity=(-MAX_TURN, MAX_TURN, "rad/s"),
-    )
-    instance_space = Box.of(
-        wanted=(*GOAL_NUMBERS, "balls"), pile=(0, NUM_PILES - 1, ""), start_shift=(-START_SHIFT, START_SHIFT, "m")
-    )
+    control_space = CONTROL
+    instance_space = INSTANCE
     goal_size = 1
-    state_space = Box.of(
-        joint_1_x=(0.0, 40.0, "m"),
-        joint_1_y=(0.0, 40.0, "m"),
-        tilt=(-1.0, 1.0, "rad"),
-        lowest_y=(0.0, 40.0, "m"),
-        velocity_x=(-20.0, 20.0, "m/s"),
-        velocity_y=(-20.0, 20.0, "m/s"),
-        angular_velocity=(-10.0, 10.0, "rad/s"),
-        held=(0.0, NUM_BALLS, "balls"),
-        held_less_wanted=(-NUM_BALLS, NUM_BALLS, "balls"),
-        held_steps=(0.0, HELD_STEPS, "steps"),
-        joint_1_to_joint_2_x=(-10.0, 10.0, "m"),
-        joint_1_to_joint_2_y=(-10.0, 10.0, "m"),
-        joint_1_to_tip_x=(-10.0, 10.0, "m"),
-        joint_1_to_tip_y=(-10.0, 10.0, "m"),
-        **{f"wants_{number}": (0.0, 1.0, "") for number in range(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)},
-    )
+    state_space = STATE
+    reward_terms: ClassVar = {
+        "progress": f"change of h (min(1 + k, 1 + n) / max(1 + k, 1 + n))^{NUMBER_EXPONENT:g}, h the share of the way "
+        f"from y = {TOOL_START[1]:g} m to {CEILING:g} m by which the tool's lowest point has been lifted, k the number "
+        "of balls vertically above the tool, n the wanted number",
+        "slack": f"{SLACK_REWARD:g}",
+        "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
+    }
+    success_conditions: ClassVar = {
+        "clear": f"the tool's lowest point is above y = {CLEAR:g} m, so that what rests on it is out of the reservoir",
+        "wanted_number": "as many balls as wanted are vertically above the tool",
+        "at_rest": f"all of them are slower than {REST_SPEED:g} m/s relative to the tool",
+    }
+    success_steps = HELD_STEPS
 
     run_settings: ClassVar[ByProfile] = {
         "quick": {"steps": 260_000},
@@ -238,15 +274,15 @@ class Scoop(Task):
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
         """Return (count, I) instances: number and pile all alike often, shift uniform."""
-        wanted = rng.integers(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1, size=count)
-        pile = rng.integers(NUM_PILES, size=count)
-        shift = rng.uniform(-START_SHIFT, START_SHIFT, size=count)
-        return np.stack([wanted, pile, shift], axis=1)
+        instances = np.zeros((count, INSTANCE.size))
+        instances[:, WANTED] = rng.integers(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1, size=count)
+        instances[:, PILE] = rng.integers(NUM_PILES, size=count)
+        instances[:, SHIFT] = rng.uniform(-START_SHIFT, START_SHIFT, size=count)
+        return instances
 
     def material(self, designs: Floats) -> Floats:
         """Return the used share of the largest total link length for designs (b, D) in their units."""
-        total: Floats = designs[:, :3].sum(axis=1) / sum(self.design_space.high[:3])
-        return total
+        return chain_material(designs, self.design_space)
 
     def effort(self, controls: Floats) -> Floats:
         """Return the share of the largest velocity, all three entries normalised, for controls (b, C) in [-1, 1]."""
@@ -260,7 +296,9 @@ class Scoop(Task):
 
     def script(self) -> Behaviour:
         """Return a script that lifts whatever tool it is given straight up, and designs a ladle for every number."""
-        return _Script(self)
+        from ._scripts.scoop import ScoopScript  # here, since that file reads this one
+
+        return ScoopScript(self)
 
     def make_simulator(self, num_slots: int, refinement: int = 1) -> Simulator:
         """Return a simulator of `num_slots` piles and tools."""
@@ -277,11 +315,10 @@ class _ScoopSimulator(PlanarSimulator):
         self.wanted = np.ones(num_slots)
         self.chain = np.zeros((num_slots, 4, 2))
         """(B, 4, 2) points of the upright tool from its first joint, m."""
-        self.turn = np.zeros((num_slots, 2))
-        """(B, 2) tilt, rad, and angular velocity, rad/s."""
+        self.tilt, self.spin = np.zeros(num_slots), np.zeros(num_slots)
+        """(B,) angle, rad, and angular velocity, rad/s, of the tools."""
         self.lowest = np.zeros(num_slots)
         """(B,) y of the tool's lowest point, m."""
-        self.held_steps = np.zeros(num_slots)
         self.hand_velocity = np.zeros((num_slots, 2))
         """(B, 2) of the hands in the last control step, m/s."""
         self.progress = np.zeros(num_slots)
@@ -291,16 +328,16 @@ class _ScoopSimulator(PlanarSimulator):
 
     def begin(self, slots: Slots, instances: Floats) -> None:
         """Put the piles of `instances` (b, I) into the reservoirs."""
-        wanted, pile = np.rint(instances[:, :2]).astype(int).T
+        self.forget(slots)
+        wanted, pile = (np.rint(instances[:, entry]).astype(int) for entry in (WANTED, PILE))
         self.wanted[slots] = wanted
         self.bodies[slots] = 0.0
-        self.bodies[slots, :NUM_BALLS, :2] = settled_piles()[pile]
-        self.bodies[slots, NUM_BALLS, :2] = TOOL_START
-        self.bodies[slots, NUM_BALLS, 0] += instances[:, 2]
+        self.bodies[slots, BALL_BODIES, PLACE] = settled_piles()[pile]
+        self.bodies[slots, TOOL_BODY, PLACE] = TOOL_START
+        self.bodies[slots, TOOL_BODY, 0] += instances[:, SHIFT]
         self.chain[slots] = 0.0
-        for values in (self.turn, self.hand_velocity, self.outcome, self.held_steps, self.progress, self.reward):
+        for values in (self.tilt, self.spin, self.hand_velocity, self.progress):
             values[slots] = 0.0
-        self.success[slots] = False
         self.lowest[slots] = TOOL_START[1]
         self._write_state(slots, self.chain[slots])
 
@@ -309,10 +346,10 @@ class _ScoopSimulator(PlanarSimulator):
         points = chain_points(designs, FIRST_LINK_ANGLE)
         chain = points - points[:, 1:2]
         self.chain[slots] = chain
-        self.bodies[slots, NUM_BALLS, 1] = TOOL_START[1] - chain[..., 1].min(axis=1)
-        places = chain + self.bodies[slots, NUM_BALLS, None, :2]
+        self.bodies[slots, TOOL_BODY, 1] = TOOL_START[1] - chain[..., 1].min(axis=1)
+        places = chain + self.bodies[slots, TOOL_BODY, None, PLACE]
         for slot, tool in zip(slots.tolist(), places, strict=True):
-            self.bodies[slot, :NUM_BALLS, :2] = make_room(self.bodies[slot, :NUM_BALLS, :2], tool)
+            self.bodies[slot, BALL_BODIES, PLACE] = make_room(self.bodies[slot, BALL_BODIES, PLACE], tool)
         self.add_spaces(slots, chain)
         self._look(slots)
 
@@ -321,11 +358,11 @@ class _ScoopSimulator(PlanarSimulator):
         space, balls = empty_reservoir(), self.balls[slot]
         if balls is None:
             balls = self.balls[slot] = Balls.new()
-            balls.move(None, space, self.bodies[slot, :NUM_BALLS, :2])
+            balls.move(None, space, self.bodies[slot, BALL_BODIES, PLACE])
         else:
-            balls.move(self.spaces[slot], space, self.bodies[slot, :NUM_BALLS, :2])
+            balls.move(self.spaces[slot], space, self.bodies[slot, BALL_BODIES, PLACE])
         tool = pymunk.Body(TOOL_MASS, TOOL_MOMENT)
-        tool.position = tuple(self.bodies[slot, NUM_BALLS, :2].tolist())
+        tool.position = tuple(self.bodies[slot, TOOL_BODY, PLACE].tolist())
         links = [pymunk.Segment(tool, tuple(a), tuple(b), LINK_HALF_WIDTH) for a, b in pairwise(points.tolist())]
         for link in links:
             link.friction = TOOL_FRICTION
@@ -349,23 +386,27 @@ class _ScoopSimulator(PlanarSimulator):
             hand.angular_velocity = spin
         self.advance(slots)
         self.read_bodies(slots)
-        tools = [self.tools[slot] for slot in slots.tolist()]
-        self.turn[slots] = [(tool.angle, tool.angular_velocity) for tool in tools if tool is not None]
+        tools = [tool for slot in slots.tolist() if (tool := self.tools[slot]) is not None]
+        self.tilt[slots] = [tool.angle for tool in tools]
+        self.spin[slots] = [tool.angular_velocity for tool in tools]
         before = self.progress[slots]
         self._look(slots)
-        self.success[slots] = self.held_steps[slots] >= HELD_STEPS
-        reward = self.progress[slots] - before + TABLE.slack_reward + SUCCESS_REWARD * self.success[slots]
-        self.reward[slots] = reward
+        self.set_reward(
+            slots,
+            progress=self.progress[slots] - before,
+            slack=SLACK_REWARD,
+            success=SUCCESS_REWARD * self.success[slots],
+        )
 
     def inspect(self, slot: int) -> Physics:
         """Return the balls' deepest overlap, the speed of the fastest, and whether all are inside the outer walls."""
         space = self.spaces[slot]
         balls = [shape for shape in space.shapes if isinstance(shape, pymunk.Circle)]
-        places = self.bodies[slot, :NUM_BALLS, :2]
+        places = self.bodies[slot, BALL_BODIES, PLACE]
         inside = (places[:, 0] > YARD[0]) & (places[:, 0] < YARD[1]) & (places[:, 1] > FLOOR)
         return Physics(
             overlap=max(overlap(space, ball) for ball in balls),
-            speed=float(np.linalg.norm(self.bodies[slot, :NUM_BALLS, 2:], axis=1).max()),
+            speed=float(np.linalg.norm(self.bodies[slot, BALL_BODIES, VELOCITY], axis=1).max()),
             contained=bool(inside.all()),
         )
 
@@ -376,16 +417,16 @@ class _ScoopSimulator(PlanarSimulator):
     def _allowed(self, slots: Slots, controls: Floats) -> tuple[Floats, Floats]:
         """Return velocity (b, 2) and angular velocity (b,) for `controls` (b, C) that keep tools where they may be."""
         period = self.clock.control_period
-        tilt = self.turn[slots, 0]
-        next_tilt = np.clip(tilt + controls[:, 2] * (MAX_TURN * period), -MAX_TILT, MAX_TILT)
+        tilt = self.tilt[slots]
+        next_tilt = np.clip(tilt + controls[:, TURN] * (MAX_TURN * period), -MAX_TILT, MAX_TILT)
         points = rotated(self.chain[slots], next_tilt)
         low, high = points.min(axis=1), points.max(axis=1)
         least = np.array([RESERVOIR[0] + CLEARANCE, TOOL_START[1]]) - low
         most = np.stack([RESERVOIR[1] - CLEARANCE - high[:, 0], CEILING - low[:, 1]], axis=1)
         middle = 0.5 * (least + most)  # A tool that tilting made too wide for both clearances stays in the middle.
-        joint, change = self.bodies[slots, NUM_BALLS, :2], MAX_ACCELERATION * period
+        joint, change = self.bodies[slots, TOOL_BODY, PLACE], MAX_ACCELERATION * period
         before = self.hand_velocity[slots]
-        wish = joint + np.clip(controls[:, :2] * MAX_SPEED, before - change, before + change) * period
+        wish = joint + np.clip(controls[:, MOVE] * MAX_SPEED, before - change, before + change) * period
         target = np.clip(wish, np.minimum(least, middle), np.maximum(most, middle))
         velocity: Floats = np.clip((target - joint) / period, -MAX_SPEED, MAX_SPEED)
         self.hand_velocity[slots] = velocity
@@ -393,62 +434,34 @@ class _ScoopSimulator(PlanarSimulator):
         return velocity, turn
 
     def _look(self, slots: Slots) -> None:
-        """Count balls and measure progress; write the state."""
-        balls, tool = self.bodies[slots, :NUM_BALLS], self.bodies[slots, NUM_BALLS, None]
-        wanted, chain = self.wanted[slots], rotated(self.chain[slots], self.turn[slots, 0])
-        self.lowest[slots] = lowest = tool[:, 0, 1] + chain[..., 1].min(axis=1)
-        loaded = above(balls[..., :2] - tool[..., :2], chain)
+        """Count balls, judge success and measure progress; write the state."""
+        balls, tool = self.bodies[slots, BALL_BODIES], self.bodies[slots, TOOL_BODY]
+        wanted, chain = self.wanted[slots], rotated(self.chain[slots], self.tilt[slots])
+        self.lowest[slots] = lowest = tool[:, 1] + chain[..., 1].min(axis=1)
+        from_tool = balls - tool[:, None]
+        loaded = above(from_tool[..., PLACE], chain)
         number = loaded.sum(axis=1)
-        self.outcome[slots] = held = np.where(lowest > CLEAR, number, 0)
-        moving = ((balls[..., 2:] - tool[..., 2:]) ** 2).sum(axis=2) > REST_SPEED**2
-        right = (held == wanted) & ~(loaded & moving).any(axis=1)
-        self.held_steps[slots] = np.where(right, self.held_steps[slots] + 1.0, 0.0)
+        clear = lowest > CLEAR
+        self.outcome[slots] = np.where(clear, number, 0)
+        moving = (from_tool[..., VELOCITY] ** 2).sum(axis=2) > REST_SPEED**2
+        at_rest = ~(loaded & moving).any(axis=1)
+        self.set_success(slots, HELD_STEPS, clear=clear, wanted_number=number == wanted, at_rest=at_rest)
         lift = np.clip((lowest - TOOL_START[1]) / (CEILING - TOOL_START[1]), 0.0, 1.0)
         ratio = (1.0 + np.minimum(number, wanted)) / (1.0 + np.maximum(number, wanted))
         self.progress[slots] = lift * ratio**NUMBER_EXPONENT
         self._write_state(slots, chain)
 
     def _write_state(self, slots: Slots, chain: Floats) -> None:
-        tool, wanted = self.bodies[slots, NUM_BALLS], self.wanted[slots]
-        state = np.empty((len(slots), self.state.shape[1]))
-        state[:, 0:2], state[:, 4:6] = tool[:, :2], tool[:, 2:]
-        state[:, 2], state[:, 6] = self.turn[slots].T
-        state[:, 3] = self.lowest[slots]
-        state[:, 7], state[:, 8] = self.outcome[slots], self.outcome[slots] - wanted
-        state[:, 9] = self.held_steps[slots]
-        state[:, 10:14] = chain[:, 2:].reshape(-1, 4)
-        state[:, 14:] = wanted[:, None] == np.arange(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)
+        tool, wanted = self.bodies[slots, TOOL_BODY], self.wanted[slots]
+        state = np.empty((len(slots), STATE.size))
+        state[:, JOINT], state[:, JOINT_VELOCITY] = tool[:, PLACE], tool[:, VELOCITY]
+        state[:, TILT], state[:, ANGULAR_VELOCITY] = self.tilt[slots], self.spin[slots]
+        state[:, LOWEST] = self.lowest[slots]
+        state[:, HELD], state[:, HELD_LESS_WANTED] = self.outcome[slots], self.outcome[slots] - wanted
+        state[:, HELD_FOR] = self.met_steps[slots]
+        state[:, SHAPE] = chain[:, 2:].reshape(len(slots), -1)
+        state[:, WANTS] = wanted[:, None] == np.arange(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)
         self.state[slots] = state
-
-
-class _Script(Behaviour):
-    """Lifts the tool straight up, so that its shape alone decides how many balls stay on it."""
-
-    SHAPES: ClassVar[tuple[tuple[float, ...], ...]] = (
-        (-0.3, -0.8, -0.9, -0.1, 0.3),
-        (-0.5, 0.0, -0.9, -0.4, 1.0),
-        (0.1, -0.9, -0.7, 0.6, 0.6),
-        (0.5, -1.0, -0.6, 0.9, -0.5),
-        (0.1, -0.9, 0.1, 0.6, 0.4),
-        (0.8, 0.4, -0.9, 0.6, 0.4),
-        (0.2, 0.0, 0.8, 0.8, 0.9),
-    )
-    """A ladle for each of 1 to 7 balls, normalised: the best of a few hundred random tools."""
-
-    def __init__(self, task: Scoop) -> None:
-        self.task = task
-
-    def design(self, observation: Singles) -> Singles:
-        """Return the ladle for the wanted number."""
-        wanted = np.rint(observation[..., self.task.layout.goal][..., 0]).astype(int)
-        shapes: Singles = np.array(self.SHAPES, dtype=np.float32)[wanted - GOAL_NUMBERS[0]]
-        return shapes
-
-    def act(self, observation: Singles) -> Singles:
-        """Return straight up, normalised."""
-        result: Singles = np.zeros((*observation.shape[:-1], self.task.control_space.size), dtype=np.float32)
-        result[..., 1] = 1.0
-        return result
 
 
 def empty_reservoir() -> pymunk.Space:
@@ -555,7 +568,7 @@ def distances(places: Floats, tool: Floats) -> Floats:
 
 
 def above(places: Floats, chains: Floats) -> Booleans:
-    """Tell which `places` (b, N, 2) are vertically above a link of the chains with points (b, 4, 2)."""
+    """Return which `places` (b, N, 2) are vertically above a link of the chains with points (b, 4, 2)."""
     start, link = chains[:, None, :-1], np.diff(chains, axis=1)[:, None]
     offset = places[:, :, None] - start
     wide = np.abs(link[..., 0]) > 1e-9

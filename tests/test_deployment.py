@@ -23,8 +23,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.seeding import generator
 from codesign_bench.storage.policies import policy_and_task
-from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
-from codesign_bench.task import Behaviour, Floats, Singles
+from codesign_bench.task import Behaviour, Floats, Singles, deployment_of
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.robot import IDEAL, PANDA
 
@@ -56,13 +55,13 @@ def play(conditions: Conditions, instance: Floats = NEAR_START, task_name: str =
 
 
 def test_the_papers_real_starts_are_turned_by_half_a_turn_into_our_frame() -> None:
-    trials = load_task("fetch_cube").robot_trials()
+    trials = deployment_of(load_task("fetch_cube")).trials
     assert trials.own.tolist() == [[0.110, 0.803], [0.339, 0.588], [-0.155, 0.731], [-0.211, 0.633]]
-    assert len(trials.own) == len(load_task("lift_cup").robot_trials().own) == 4
+    assert len(trials.own) == len(deployment_of(load_task("lift_cup")).trials.own) == 4
 
 
 def test_the_grid_is_the_papers_with_the_farthest_row_first() -> None:
-    grid = load_task("fetch_cube").robot_trials().grid
+    grid = deployment_of(load_task("fetch_cube")).trials.grid
     assert grid.shape == (3, 4, 2)
     assert np.diff(grid[:, 0, 1]) == pytest.approx([-0.06, -0.06])
     assert np.diff(grid[0, :, 0]) == pytest.approx([0.28533] * 3, abs=1e-5)
@@ -70,17 +69,17 @@ def test_the_grid_is_the_papers_with_the_farthest_row_first() -> None:
 
 
 def test_the_protocol_has_five_trials_of_each_tool_and_twelve_starts() -> None:
-    trials = load_task("fetch_cube").robot_trials()
-    assert len(list(own_trials(trials, (1, 2, 3, 4), REAL_ROBOT.trials))) == 20
+    trials = deployment_of(load_task("fetch_cube")).trials
+    assert len(list(own_trials(trials, (1, 2, 3, 4), trials.trials_per_tool))) == 20
     planned = list(grid_trials(trials, (1, 2, 3, 4)))
     assert len({trial.name for trial in planned}) == 48
-    assert list(grid_trials(load_task("lift_cup").robot_trials(), (1, 2))) == []
+    assert list(grid_trials(deployment_of(load_task("lift_cup")).trials, (1, 2))) == []
 
 
 @pytest.mark.parametrize("name", TASKS)
 def test_with_the_ideal_arm_and_nothing_changed_deployment_is_the_task_itself(name: str) -> None:
     task = load_task(name)
-    instance = task.robot_trials().own[3]
+    instance = deployment_of(task).trials.own[3]
     expected = evaluate(task, task.script(), instances=instance[None])
     rollout, _ = play(Conditions(arm=IDEAL), instance, name)
     assert rollout.success == expected.successes[0]
@@ -90,7 +89,7 @@ def test_with_the_ideal_arm_and_nothing_changed_deployment_is_the_task_itself(na
 
 @pytest.mark.parametrize("name", TASKS)
 def test_a_tool_works_on_the_panda_as_it_does_on_the_gantry(name: str) -> None:
-    instance = load_task(name).robot_trials().own[3]
+    instance = deployment_of(load_task(name)).trials.own[3]
     ideal, _ = play(Conditions(arm=IDEAL), instance, name)
     real, _ = play(Conditions(arm=PANDA), instance, name)
     assert ideal.success
@@ -175,7 +174,7 @@ def test_trials_are_written_with_their_incidents_and_a_picture_of_each(tmp_path:
 def test_a_cube_that_ends_within_5_cm_is_nearly_fetched() -> None:
     task = load_task("fetch_cube")
     rollout, _ = play(Conditions(arm=IDEAL))
-    settings = task.robot_trials()
+    settings = deployment_of(task).trials
     ends = [replace(rollout, success=outcome < 0.5, outcome=outcome) for outcome in (0.49, 0.54, 0.56)]
     rows = [row(task, settings, NEAR_START, end, kind="own", tool=1) for end in ends]
     assert [(entry["success"], entry["near"]) for entry in rows] == [(1, 0), (0, 1), (0, 0)]
@@ -198,6 +197,18 @@ def test_the_command_refuses_what_does_not_go_together(capsys: pytest.CaptureFix
     assert "--protocol sets tools and trials itself" in capsys.readouterr().err
     assert main(["deploy", "--policy", "nowhere"]) == 2
     assert "'nowhere' is not a cell folder" in capsys.readouterr().err
+
+
+def test_a_trial_takes_no_more_steps_than_the_task_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    task = load_task("lift_cup")
+    spec = deployment_of(task)
+    short = replace(spec, trials=replace(spec.trials, max_steps=3))
+    monkeypatch.setattr(type(task), "deployment", short)
+    deployment = Deployment(task, task.script(), Conditions(arm=IDEAL))
+    instance = spec.trials.own[0]
+    rollout = deployment.play(instance, deployment.unit_design(instance), generator(0, "short"))
+    assert rollout.steps == 3
+    assert not rollout.success
 
 
 def test_watching_a_trial_sees_its_start_and_every_step() -> None:

@@ -37,6 +37,7 @@ class ToyReach(Task):
     control_space = Box.of(speed=(-1.0, 1.0, "m/s"))
     instance_space = Box.of(goal=(0.0, 1.0, "m"))
     goal_size = 1
+    position_entries = ("goal",)
     state_space = Box.of(tip=(-2.0, 2.0, "m"))
     num_evaluation_instances = 8
 

@@ -25,8 +25,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.seeding import generator
 from codesign_bench.storage.files import write_bytes, write_json
 from codesign_bench.storage.layout import open_folder, write_rows
-from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
-from codesign_bench.task import Behaviour, Task, deployable_tasks
+from codesign_bench.task import Behaviour, Task, deployment_of
 
 
 @dataclass(frozen=True)
@@ -63,11 +62,9 @@ def deploy(
     """
     if order.trials < 1:
         raise UserError(f"--trials must be at least 1, not {order.trials}")
-    if task.name not in deployable_tasks():
-        raise UserError(f"task '{task.name}' has no deployment; choose from: {', '.join(deployable_tasks())}")
-    settings = task.robot_trials()
+    settings = deployment_of(task).trials
     tools = order.tools or tuple(range(1, len(settings.own) + 1))
-    planned = list(own_trials(settings, tools, REAL_ROBOT.trials if order.protocol else order.trials))
+    planned = list(own_trials(settings, tools, settings.trials_per_tool if order.protocol else order.trials))
     planned += grid_trials(settings, tools) if order.protocol else []
     deployment = Deployment(task, policy, order.conditions)
     open_folder(out)
@@ -78,7 +75,7 @@ def deploy(
     designs: dict[str, dict[str, float]] = {}
     rows = []
     for trial in planned:
-        film = Film(f"{task.title}, tool {trial.tool}") if order.gifs else None
+        film = Film(f"{task.title}, tool {trial.tool}", settings.max_steps) if order.gifs else None
         rng = generator(order.seed, f"deploy {task.name} {trial.name}")
         rollout = deployment.play(trial.instance, unit_designs[trial.tool], rng, film)
         values = deployment.episodes.designs[0].tolist()
@@ -97,7 +94,7 @@ def deploy(
             "policy": source,
             "seed": order.seed,
             "conditions": asdict(order.conditions),
-            "max_steps": REAL_ROBOT.max_steps,
+            "max_steps": settings.max_steps,
             "designs": designs,
             "tools": summarise(rows),
         },

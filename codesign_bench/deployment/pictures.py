@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from codesign_bench.evaluation.rendering import Moment, animation
-from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 from codesign_bench.task.episodes import Episodes
 
 STRIDE = 3
@@ -11,16 +10,16 @@ STRIDE = 3
 
 
 class Film:
-    """Pictures of a trial; `Deployment.play` calls it after every step."""
+    """Pictures of a trial of at most `max_steps` control steps; `Deployment.play` calls it after every step."""
 
-    def __init__(self, title: str) -> None:
-        self.title = title
+    def __init__(self, title: str, max_steps: int) -> None:
+        self.title, self.max_steps = title, max_steps
         self._moments: list[Moment] = []
 
     def __call__(self, episodes: Episodes) -> None:
         """Take a picture, if it is time for one or the trial has ended."""
         simulator, steps = episodes.simulator, int(episodes.elapsed[0])
-        ended = bool(simulator.success[0] or simulator.failure[0]) or steps == REAL_ROBOT.max_steps
+        ended = bool(simulator.success[0] or simulator.failure[0]) or steps == self.max_steps
         if steps % STRIDE == 0 or ended:
             end = "  success" if simulator.success[0] else "  lost" if simulator.failure[0] else ""
             self._moments.append(Moment([simulator.render(0)], [f"{self.title}  step {steps}{end}"], [False]))

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from codesign_bench.deployment.conditions import Conditions, Physics
-from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
-from codesign_bench.task import Behaviour, Floats, Singles, Task
+from codesign_bench.task import Behaviour, Floats, Singles, Task, deployment_of
 from codesign_bench.task.behaviours import GivenDesigns
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.play import first_observations, play
@@ -38,12 +37,17 @@ class Rollout:
 
 
 class Deployment:
-    """A task's policy on an arm under given conditions, trial after trial."""
+    """A task's policy on an arm under given conditions, trial after trial.
+
+    Raises:
+        UserError: the task cannot be deployed, or the conditions mean nothing.
+    """
 
     def __init__(self, task: Task, policy: Behaviour, conditions: Conditions) -> None:
         conditions.check()
         self.task, self.policy, self.conditions = task, policy, conditions
-        self.simulator = task.make_deployed_simulator(1, conditions.arm)
+        spec = deployment_of(task)
+        self.simulator, self.max_steps = spec.make_simulator(1, conditions.arm), spec.trials.max_steps
         self.episodes = Episodes(task, 1, simulator=self.simulator)
         self._lengths = np.array([unit == METRE for unit in task.state_space.units])
 
@@ -59,7 +63,7 @@ class Deployment:
         rng: np.random.Generator,
         watch: Callable[[Episodes], None] | None = None,
     ) -> Rollout:
-        """Try a design (D,) in [-1, 1] on an instance (I,), until it ends or the paper's number of steps is over.
+        """Try a design (D,) in [-1, 1] on an instance (I,), until it ends or the trial's steps are over.
 
         Args:
             instance: in the instance space's units.
@@ -77,7 +81,7 @@ class Deployment:
             if watch is not None:
                 watch(self.episodes)
             steps = turn.step
-            if steps == REAL_ROBOT.max_steps:
+            if steps == self.max_steps:
                 break
         return Rollout(
             success=bool(simulator.success[0]),

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from codesign_bench.deployment.rollout import Rollout
 from codesign_bench.errors import UserError
-from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 from codesign_bench.task import Floats, Task
 from codesign_bench.task.robot import ArmReport, RobotTrials
 
@@ -35,7 +34,7 @@ def row(task: Task, trials: RobotTrials, instance: Floats, rollout: Rollout, **w
         **where,
         **{f"instance_{name}": float(value) for name, value in zip(task.instance_space.names, instance, strict=True)},
         "success": int(rollout.success),
-        "near": int(not rollout.success and not rollout.failure and missing <= REAL_ROBOT.near_miss),
+        "near": int(not rollout.success and not rollout.failure and missing <= trials.near_miss),
         "lost": int(rollout.failure),
         "steps": rollout.steps,
         "outcome": round(rollout.outcome, 4),

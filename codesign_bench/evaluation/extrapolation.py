@@ -39,16 +39,15 @@ COLUMNS = ("task", "method", "seed", "instance", "return", "success")
 def outside_instances(task: Task) -> Floats:
     """Return up to `INSTANCES` instances (N, I) around the training region, without those that doing nothing solves.
 
-    Positions are the first entries of an instance, one or two; all others are drawn from their range.
+    Positions are drawn from around their ranges, all other entries from theirs.
 
     Raises:
         UserError: the task has no positions.
     """
     low, high = task.instance_space.bounds
-    task.in_cutout(np.stack([low]), 0.5)  # refuses tasks without positions
-    axes = min(2, task.goal_size)
+    index = task.position_index
     room = np.zeros_like(low)
-    room[:axes] = RIM * (high - low)[:axes]
+    room[index] = RIM * (high - low)[index]
     rng = generator(EVALUATION_SEED, f"outside the region of {task.name}")
     drawn = rng.uniform(low - room, high + room, size=(100 * INSTANCES, len(low)))
     beyond = ((drawn < low) | (drawn > high)).any(axis=1)

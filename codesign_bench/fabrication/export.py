@@ -17,7 +17,7 @@ from codesign_bench import __version__
 from codesign_bench.errors import UserError
 from codesign_bench.fabrication.picture import picture
 from codesign_bench.fabrication.printability import Print, judge
-from codesign_bench.fabrication.solids import MILLIMETRES, scaled, thickness, tool_solid
+from codesign_bench.fabrication.solids import MILLIMETRES, handle_of, scaled, thickness, tool_solid
 from codesign_bench.storage.files import write_bytes, write_json
 from codesign_bench.storage.layout import write_rows
 from codesign_bench.task import Behaviour, Box, Floats, Task
@@ -105,7 +105,7 @@ def export(
     for tool in np.argsort(first).tolist():
         stem, design = stems[tool], designs[tool]
         solid = tool_solid(task, design, order.scale)
-        walls = [thickness(scaled(part, order.scale)) for part in (*task.tool_parts(design), *task.gripper_handle())]
+        walls = [thickness(scaled(part, order.scale)) for part in (*task.tool_parts(design), *handle_of(task))]
         result = judge(solid.mesh, MILLIMETRES * min(walls))
         for kind in SOLID_FORMATS:
             write_bytes(out / f"{stem}.{kind}", file_content(solid.mesh, kind))
@@ -124,7 +124,7 @@ def export(
                 "printable": result.printable,
                 **asdict(result),
                 "fillet_volume_mm3": solid.fillet_volume,
-                "handle": "the gripper's, added" if task.gripper_handle() else "the tool's own first link",
+                "handle": "the gripper's, added" if handle_of(task) else "the tool's own first link",
             },
         )
         prints.append(result)

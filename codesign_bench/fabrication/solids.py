@@ -38,6 +38,11 @@ class Solid:
     """How much of it fills joints whose parts only touch, mm^3."""
 
 
+def handle_of(task: Task) -> tuple[ToolPart, ...]:
+    """Return what a gripper holds a task's printed tools by; no part where they have a handle of their own."""
+    return () if task.deployment is None else task.deployment.gripper_handle()
+
+
 def tool_solid(task: Task, design: Floats, scale: float = 1.0) -> Solid:
     """Return the tool of a design (D,), in the design space's units, as one solid with the gripper's handle.
 
@@ -47,10 +52,9 @@ def tool_solid(task: Task, design: Floats, scale: float = 1.0) -> Solid:
         scale: size of the solid over the tool's own.
 
     Raises:
-        UserError: the extra `export` is not installed, or the task does not tell what its tools are made of.
+        UserError: the extra `export` is not installed, or the task does not say what its tools are made of.
     """
-    handle = task.gripper_handle()
-    tool = task.tool_parts(design)
+    handle, tool = handle_of(task), task.tool_parts(design)
     joints = [*task.tool_graph.edges]
     # The handle's first part touches node 0, each other one the part before it.
     joints += [(len(tool) + index - 1 if index else 0, len(tool) + index) for index in range(len(handle))]

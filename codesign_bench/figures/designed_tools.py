@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MAP_SIDE = 3
-"""Goals of two or more entries: the first two are cut into so many stretches each, with one picture per field."""
+"""A map: two entries are cut into so many stretches each, with one picture per field."""
 LINE_LENGTH = 8
-"""Goals of one entry: most pictures, all in one row."""
+"""A line: most pictures of one entry, all in one row."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +70,10 @@ def designed_tools(request: Request) -> pd.DataFrame:
 
 
 def spread(goals: Floats) -> list[Place]:
-    """Choose instances that cover the goals (N, G), at most one per field of an even grid, nearest to its centre.
+    """Choose instances that cover the goals (N, 1 or 2), at most one per field of an even grid, nearest to its centre.
 
-    Goals of one entry make a line from low to high, with one instance per value where these are few; goals of more
-    make a map of their first two entries, the second upwards. Fields without goals stay empty on a map and are passed
-    over on a line.
+    Goals of one entry make a line from low to high, with one instance per value where these are few; goals of two make
+    a map, the second entry upwards. Fields without goals stay empty on a map and are passed over on a line.
     """
     goals = np.asarray(goals, dtype=np.float64)
     if goals.shape[1] == 1:
@@ -120,7 +119,8 @@ def _pictures(task: Task, cell: pd.DataFrame) -> pd.DataFrame:
     instances = _entries(cell, "instance", task.instance_space)
     designs = _entries(cell, "design", task.design_space)
     goals, space = instances[:, : task.goal_size], task.goal_space
-    places = spread(goals)
+    shown = _shown(task)
+    places = spread(instances[:, [task.instance_space.index(name) for name in shown]])
     chosen = [place.instance for place in places]
     return (
         cell.iloc[chosen]
@@ -128,12 +128,17 @@ def _pictures(task: Task, cell: pd.DataFrame) -> pd.DataFrame:
             title=task.title,
             row=[place.row for place in places],
             column=[place.column for place in places],
-            across=_words(space.names[0]),
-            up=_words(space.names[1]) if space.size > 1 else "",
+            across=_words(shown[0]),
+            up=_words(shown[1]) if len(shown) > 1 else "",
             goal=[_describe(space, goal) for goal in goals[chosen]],
         )
         .assign(picture=pd.Series(_draw(task, instances[chosen], designs[chosen]), index=cell.index[chosen]))
     )
+
+
+def _shown(task: Task) -> tuple[str, ...]:
+    """Return the one or two entries of an instance over which tools are spread: its position, or else its goal's."""
+    return task.position_entries or task.goal_space.names[:2]
 
 
 def _entries(cell: pd.DataFrame, kind: str, space: Box) -> Floats:

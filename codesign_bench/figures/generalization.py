@@ -26,8 +26,6 @@ TRAINING, CUTOUT, OUTSIDE = "training", "cutout", "outside"
 START, PLACE = "start", "place"
 """Kinds of rows: an evaluation instance with its outcome, or a place of a fine grid, which tells regions apart."""
 
-WHOLE_REGION = 1.0 + 1e-9
-"""The cutout of this fraction is the whole training region, its borders included."""
 ROOM = 0.15
 """How far the grid of places reaches beyond the training region, as a share of its extent."""
 PLACES = 14_400
@@ -92,7 +90,7 @@ def regions(task: Task, instances: Floats, fraction: float) -> NDArray[np.str_]:
     Raises:
         UserError: the task has no positions.
     """
-    inside = task.in_cutout(instances, WHOLE_REGION)
+    inside = task.in_region(instances)
     unseen = task.in_cutout(instances, fraction) if fraction > 0.0 else np.zeros(len(instances), dtype=bool)
     return np.where(unseen, CUTOUT, np.where(inside, TRAINING, OUTSIDE))
 
@@ -117,17 +115,14 @@ def _places(task: Task, fraction: float) -> pd.DataFrame:
     """Return a grid of positions around the training region of one task, with their regions."""
     import pandas as pd
 
-    space = task.instance_space
-    entries = min(2, task.goal_size)
-    low, high = space.bounds
-    room = ROOM * (high - low)[:entries]
-    count = round(PLACES ** (1.0 / entries))
-    axes = [
-        np.linspace(start - extra, stop + extra, count) for start, stop, extra in zip(low, high, room, strict=False)
-    ]
+    index = task.position_index
+    low, high = task.instance_space.bounds
+    room = ROOM * (high - low)
+    count = round(PLACES ** (1.0 / len(index)))
+    axes = [np.linspace(low[entry] - room[entry], high[entry] + room[entry], count) for entry in index]
     places = np.stack([axis.ravel() for axis in np.meshgrid(*axes)], axis=1)
     instances = np.tile(0.5 * (low + high), (len(places), 1))
-    instances[:, :entries] = places
+    instances[:, index] = places
     region = regions(task, instances, fraction)
     return pd.DataFrame(
         {"task": task.name, "cutout": fraction, "kind": PLACE, "region": region, **_positions(task, instances)}
@@ -135,13 +130,10 @@ def _places(task: Task, fraction: float) -> pd.DataFrame:
 
 
 def _positions(task: Task, instances: Floats) -> dict[str, Floats | str]:
-    """Return the position of each instance (P, I): its first entries, one or two, with their labels."""
-    space = task.goal_space
+    """Return the position of each instance (P, I) with labels; positions of one entry have no y."""
+    space = task.instance_space.part(*task.position_entries)
     labels = [f"{name.replace('_', ' ')} ({unit})" for name, unit in zip(space.names, space.units, strict=True)]
-    two = space.size > 1
-    return {
-        "x": instances[:, 0],
-        "y": instances[:, 1] if two else np.full(len(instances), np.nan),
-        "x_label": labels[0],
-        "y_label": labels[1] if two else "",
-    }
+    values = [instances[:, entry] for entry in task.position_index]
+    x, y = (*values, np.full(len(instances), np.nan))[:2]
+    x_label, y_label = (*labels, "")[:2]
+    return {"x": x, "y": y, "x_label": x_label, "y_label": y_label}

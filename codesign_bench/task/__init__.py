@@ -6,22 +6,27 @@ of it, `robot.py` what deployment on an arm asks of a task.
 """
 
 from codesign_bench.task.behaviour import Behaviour
-from codesign_bench.task.loading import deployable_tasks, load_task, task_names
+from codesign_bench.task.loading import deployable_tasks, deployment_of, load_task, task_names
+from codesign_bench.task.scene import OURS, Constant, Given, constants
 from codesign_bench.task.simulator import Physics, Simulator, Soundness
-from codesign_bench.task.spaces import Booleans, Box, Floats, Frame, Layout, Quantity, Singles, Slots
+from codesign_bench.task.spaces import Booleans, Box, Floats, Frame, Layout, Observed, Quantity, Singles, Slots, Span
 from codesign_bench.task.task import EVALUATION_SEED, ByProfile, Task
 from codesign_bench.task.tool import BoxPart, PlanarPart, ToolGraph, ToolPart
 
 __all__ = [
     "EVALUATION_SEED",
+    "OURS",
     "Behaviour",
     "Booleans",
     "Box",
     "BoxPart",
     "ByProfile",
+    "Constant",
     "Floats",
     "Frame",
+    "Given",
     "Layout",
+    "Observed",
     "Physics",
     "PlanarPart",
     "Quantity",
@@ -29,10 +34,13 @@ __all__ = [
     "Singles",
     "Slots",
     "Soundness",
+    "Span",
     "Task",
     "ToolGraph",
     "ToolPart",
+    "constants",
     "deployable_tasks",
+    "deployment_of",
     "load_task",
     "task_names",
 ]

@@ -13,14 +13,15 @@ from codesign_bench.task.task import Task
 
 
 class GivenDesigns(Behaviour):
-    """A controller with designs given beforehand, one per episode."""
+    """A controller with designs given beforehand: one per episode, or the same for all."""
 
     def __init__(self, unit_designs: Floats, controller: Behaviour) -> None:
+        """Take (B, D) designs for episodes played side by side, or one design (D,) for any number, in [-1, 1]."""
         self.unit_designs, self.controller = unit_designs.astype(np.float32), controller
 
     def design(self, observation: Singles) -> Singles:
         """Return the given designs (B, D), whatever the observation."""
-        return self.unit_designs
+        return np.broadcast_to(self.unit_designs, (*observation.shape[:-1], self.unit_designs.shape[-1]))
 
     def act(self, observation: Singles) -> Singles:
         """Return the controller's control."""

@@ -68,12 +68,14 @@ class _Rollouts:
         """(B,) whether the next step is the design step."""
         self.ended: Booleans = np.ones(num_slots, dtype=bool)
         """(B,) whether the episode is over, or never began."""
+        self.controlled: Booleans = np.zeros(num_slots, dtype=bool)
+        """(B,) whether the last step was a control step."""
 
     def reset(self, slots: Slots, instances: Floats) -> None:
         """Begin episodes of `instances` (b, I) in `slots` (b,)."""
         self.episodes.begin(slots, instances)
         self.designing[slots] = True
-        self.ended[slots] = False
+        self.ended[slots] = self.controlled[slots] = False
 
     def step(self, slots: Slots, actions: Floats) -> tuple[Floats, Booleans, Booleans]:
         """Take one design or control step in `slots` (b,) with actions (b, D + C).
@@ -94,6 +96,7 @@ class _Rollouts:
             outcome = self.episodes.control(slots[later], actions[later, size:])
             reward[later], terminated[later], truncated[later] = outcome
         self.designing[slots] = False
+        self.controlled[slots] = ~first
         self.ended[slots] = terminated | truncated
         return reward, terminated, truncated
 
@@ -120,6 +123,10 @@ class ToolEnv(gymnasium.Env[Any, Any]):
 
     Episode end
         Terminated by success or failure, truncated at the time limit; `info["success"]` on the last step tells which.
+
+    Info
+        `info["reward_terms"]` on control steps: what this step's reward is the sum of, name -> value, with the names of
+        `Task.reward_terms` (one term, `task`, where a task names none) and `tradeoff`.
     """
 
     metadata: dict[str, Any] = {"render_modes": [RGB_ARRAY]}  # noqa: RUF012 - Gymnasium reads it from the class
@@ -153,8 +160,7 @@ class ToolEnv(gymnasium.Env[Any, Any]):
         actions = np.asarray(action, dtype=np.float64)[None]
         reward, terminated, truncated = self._rollouts.step(self._slots, actions)
         ended = bool(terminated[0] or truncated[0])
-        info = {"success": bool(self._rollouts.episodes.success(self._slots)[0])} if ended else {}
-        return self._observation(), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
+        return self._observation(), float(reward[0]), bool(terminated[0]), bool(truncated[0]), self._info(ended)
 
     def render(self) -> Any:
         """Return a picture of the scene, (height, width, 3), in RGB, with `render_mode="rgb_array"`; else None."""
@@ -163,13 +169,22 @@ class ToolEnv(gymnasium.Env[Any, Any]):
     def _observation(self) -> Singles:
         return self._rollouts.episodes.observation[0].copy()
 
+    def _info(self, ended: bool) -> dict[str, Any]:
+        episodes, info = self._rollouts.episodes, dict[str, Any]()
+        if self._rollouts.controlled[0]:
+            info["reward_terms"] = {name: float(values[0]) for name, values in episodes.reward_terms.items()}
+        if ended:
+            info["success"] = bool(episodes.success(self._slots)[0])
+        return info
+
 
 class ToolVectorEnv(VectorEnv[Any, Any, Any]):
     """`num_envs` environments like `ToolEnv` in one process and one batched simulator, the one that methods train on.
 
     The step after an episode's last begins the next one (Gymnasium's NEXT_STEP): it ignores the action and has reward
-    0. `info["success"]` (B,) holds where `info["_success"]` (B,) is true, which is on last steps. Environment `i` of
-    `reset(seed=s)` goes as `ToolEnv` does after `reset(seed=s + i)`.
+    0. Infos are Gymnasium's: `info["success"]` (B,) holds where `info["_success"]` (B,) is true, which is on last
+    steps; each term of `info["reward_terms"]` (B,) where `info["_reward_terms"]` is, which is on control steps.
+    Environment `i` of `reset(seed=s)` goes as `ToolEnv` does after `reset(seed=s + i)`.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium reads it from the class
@@ -247,10 +262,17 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
         return seed
 
     def _info(self) -> dict[str, Any]:
-        ended = self._rollouts.ended.copy()
-        if not ended.any():
-            return {}
-        return {"success": ended & self._rollouts.episodes.simulator.success, "_success": ended}
+        """Return what `ToolEnv` does for each environment, merged as `VectorEnv` does it: masks have a `_`."""
+        episodes, info = self._rollouts.episodes, dict[str, Any]()
+        controlled, ended = self._rollouts.controlled, self._rollouts.ended
+        if controlled.any():
+            terms: dict[str, Any] = {}
+            for name, values in episodes.reward_terms.items():
+                terms |= {name: np.where(controlled, values, 0.0), f"_{name}": controlled.copy()}
+            info |= {"reward_terms": terms, "_reward_terms": controlled.copy()}
+        if ended.any():
+            info |= {"success": ended & episodes.simulator.success, "_success": ended.copy()}
+        return info
 
 
 def _given(instance: Any, task: Task, count: int) -> Floats:

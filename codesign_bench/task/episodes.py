@@ -13,8 +13,8 @@ from codesign_bench.task.simulator import Simulator
 from codesign_bench.task.spaces import Booleans, Floats, Singles, Slots
 from codesign_bench.task.task import Task
 
-TRADEOFF_TERM = "tradeoff"
-"""The name of the trade-off's share among the terms of a reward."""
+TRADEOFF_TERM, TASK_TERM = "tradeoff", "task"
+"""Names, among the terms of a reward, of the trade-off's share and of a task's own reward if it names no terms."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Episodes:
         self.designs: Floats = np.zeros((num_slots, task.design_space.size))
         """(B, D) designs of the tools, in the design space's units."""
         self.reward_terms: dict[str, Floats] = {}
-        """Name -> (B,): what the last control step's reward is the sum of; empty where the task names no terms."""
+        """Name -> (B,): what the last control step's reward is the sum of; empty before any control step."""
         self._material = np.zeros(num_slots)
         space = task.state_space
         self._state_low, self._state_high = np.array(space.low, np.float32), np.array(space.high, np.float32)
@@ -100,7 +100,7 @@ class Episodes:
         simulator.step(slots, clipped)
         self.elapsed[slots] += 1
         reward = simulator.reward[slots]
-        self.reward_terms.update(simulator.reward_terms)
+        self.reward_terms.update(simulator.reward_terms or {TASK_TERM: simulator.reward})
         if self.tradeoff is not None:
             saved = self.tradeoff.reward(self._material[slots], self.task.effort(clipped))
             self.reward_terms.setdefault(TRADEOFF_TERM, np.zeros(self.num_slots))[slots] = saved
@@ -112,7 +112,7 @@ class Episodes:
         return reward, terminated, truncated
 
     def success(self, slots: Slots) -> Booleans:
-        """Tell which of `slots` (b,) hold a solved episode."""
+        """Return which of `slots` (b,) hold a solved episode."""
         return self.simulator.success[slots]
 
     def _observe(self, slots: Slots) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from codesign_bench.errors import UserError
 from codesign_bench.registry import load, names
+from codesign_bench.task.robot import DeploymentSpec
 from codesign_bench.task.task import Task
 
 
@@ -13,8 +15,18 @@ def task_names() -> tuple[str, ...]:
 
 def deployable_tasks() -> tuple[str, ...]:
     """Return the names of the tasks that can be deployed on an arm."""
-    base = Task.make_deployed_simulator
-    return tuple(name for name in task_names() if type(load_task(name)).make_deployed_simulator is not base)
+    return tuple(name for name in task_names() if load_task(name).deployment is not None)
+
+
+def deployment_of(task: Task) -> DeploymentSpec:
+    """Return how a task is deployed on an arm.
+
+    Raises:
+        UserError: it cannot be.
+    """
+    if task.deployment is None:
+        raise UserError(f"task '{task.name}' has no deployment; choose from: {', '.join(deployable_tasks())}")
+    return task.deployment
 
 
 def load_task(name: str) -> Task:

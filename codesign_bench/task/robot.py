@@ -1,4 +1,4 @@
-"""What deployment asks of a task beyond `Simulator`: trials, other physics, and what happened to the arm.
+"""What deployment on a robot arm asks of a task: trials, a simulator with other physics, what happened to the arm.
 
 Shapes: `T` tools, `R` rows and `C` columns of a grid, `I` instance.
 """
@@ -6,10 +6,12 @@ Shapes: `T` tools, `R` rows and `C` columns of a grid, `I` instance.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from codesign_bench.task.simulator import Simulator
 from codesign_bench.task.spaces import Floats
+from codesign_bench.task.tool import ToolPart
 
 IDEAL, PANDA = "ideal", "panda"
 ARMS = (PANDA, IDEAL)
@@ -49,7 +51,7 @@ class ArmReport:
 
 @dataclass(frozen=True)
 class RobotTrials:
-    """The instances of a task on which the paper tried its tools on the real robot, in the task's own frame."""
+    """The trials of a task's tools on a robot, in the task's own frame."""
 
     own: Floats
     """(T, I): what each of T tools is designed for."""
@@ -57,6 +59,12 @@ class RobotTrials:
     """(R, C, I): on which every tool is tried, the row that is farthest from the robot first; R is 0 without a grid."""
     success_outcome: float
     """The task's outcome at which an episode succeeds, in the outcome's unit."""
+    near_miss: float
+    """A failure whose outcome is this near to success counts as nearly solved, in the outcome's unit."""
+    trials_per_tool: int
+    """Trials with each tool on its own instance."""
+    max_steps: int
+    """Control steps until a trial ends without success."""
 
 
 class DeployedSimulator(Simulator):
@@ -69,3 +77,22 @@ class DeployedSimulator(Simulator):
     @abstractmethod
     def arm_report(self, slot: int) -> ArmReport:
         """Return what has happened to the arm in `slot` since `build`."""
+
+
+def no_handle() -> tuple[ToolPart, ...]:
+    """Return no part: the tools have a handle among their own parts, or no gripper holds them."""
+    return ()
+
+
+@dataclass(frozen=True)
+class DeploymentSpec:
+    """How a task's policies and tools are tried on a robot arm."""
+
+    trials: RobotTrials
+    make_simulator: Callable[[int, str], DeployedSimulator]
+    """Returns a simulator with so many slots whose tools are held by an arm, one of `ARMS`."""
+    gripper_handle: Callable[[], tuple[ToolPart, ...]] = no_handle
+    """Returns what the gripper holds a printed tool by, beyond `Task.tool_parts`, in the frame of the held point.
+
+    The first part touches the tool's node 0, every other one the part before it.
+    """

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codesign_bench.task.spaces import Booleans, Floats, Frame, Singles, Slots
 from codesign_bench.task.tool import ToolPart
@@ -38,7 +40,7 @@ class Soundness:
     """Halving the physics step changes the outcome of a scripted episode by less than this, in the outcome's unit.
 
     It holds for the median episode; where contact is chaotic, for the mean over instances, and a two-sample
-    Kolmogorov-Smirnov test does not tell the outcomes' distributions apart.
+    Kolmogorov-Smirnov test finds no difference between the outcomes' distributions.
     """
     start_overlap: float = 1e-3
     """Right after the design step, no design overlaps anything deeper than this, m."""
@@ -61,6 +63,10 @@ class Simulator(ABC):
         """(B,) reward of the last step."""
         self.reward_terms: dict[str, Floats] = {}
         """Name -> (B,): what the last step's reward is the sum of, as far as the task names it."""
+        self.conditions: dict[str, Booleans] = {}
+        """Name -> (B,): whether each condition of success holds now, as far as the task names them."""
+        self.met_steps: Slots = np.zeros(num_slots, dtype=np.intp)
+        """(B,) control steps in a row, up to now, in which all conditions of success held."""
         self.success: Booleans = np.zeros(num_slots, dtype=bool)
         """(B,) whether the task is solved; ends the episode."""
         self.failure: Booleans = np.zeros(num_slots, dtype=bool)
@@ -80,13 +86,40 @@ class Simulator(ABC):
     def step(self, slots: Slots, controls: Floats) -> None:
         """Advance `slots` by one control step with `controls` (b, C) in [-1, 1]; write state, reward and both ends."""
 
-    def set_reward(self, slots: Slots, **terms: Floats | float) -> None:
-        """Reward `slots` (b,) by the sum of named terms, (b,) each, added up in the order given."""
-        total: Floats | float = 0.0
+    def forget(self, slots: Slots) -> None:
+        """Forget the last episodes of `slots` (b,): rewards, conditions, ends and outcomes. For `begin`."""
+        for values in (self.reward, self.outcome, *self.reward_terms.values()):
+            values[slots] = 0.0
+        for flags in (self.success, self.failure, *self.conditions.values()):
+            flags[slots] = False
+        self.met_steps[slots] = 0
+
+    def set_reward(self, slots: Slots, **terms: NDArray[np.floating[Any]] | float) -> None:
+        """Reward `slots` (b,) by the sum of named terms, (b,) each, added up in the order given. For `step`."""
+        total: NDArray[np.floating[Any]] | float = 0.0
         for index, (name, values) in enumerate(terms.items()):
-            self.reward_terms.setdefault(name, np.zeros(self.num_slots))[slots] = values
+            if name not in self.reward_terms:
+                self.reward_terms[name] = np.zeros(self.num_slots)
+            self.reward_terms[name][slots] = values
             total = values if index == 0 else total + values
         self.reward[slots] = total
+
+    def set_success(self, slots: Slots, steps: int = 1, **conditions: Booleans) -> None:
+        """Call `slots` (b,) solved once all named conditions, (b,) each, have held together for a while. For `step`.
+
+        Args:
+            slots: which took a control step.
+            steps: control steps in a row for which the conditions must hold.
+            conditions: whether each holds now.
+        """
+        met: Booleans = np.ones(len(slots), dtype=bool)
+        for name, holds in conditions.items():
+            if name not in self.conditions:
+                self.conditions[name] = np.zeros(self.num_slots, dtype=bool)
+            self.conditions[name][slots] = holds
+            met &= holds
+        self.met_steps[slots] = np.where(met, self.met_steps[slots] + 1, 0)
+        self.success[slots] = self.met_steps[slots] >= steps
 
     def advance(self, slots: Slots) -> None:
         """Make the engine's own physics steps of one control step, and nothing else: the raw cost of a step.
@@ -100,7 +133,7 @@ class Simulator(ABC):
         """Return what the scene in `slot` looks like to someone who checks its physics; changes nothing.
 
         Raises:
-            NotImplementedError: the task does not tell.
+            NotImplementedError: the task does not say.
         """
         raise NotImplementedError
 
@@ -108,7 +141,7 @@ class Simulator(ABC):
         """Return what the engine itself lets collide as the tool in `slot`, in the frame of the held point.
 
         Raises:
-            NotImplementedError: the task does not tell.
+            NotImplementedError: the task does not say.
         """
         raise NotImplementedError
 

@@ -1,12 +1,12 @@
 """Named, bounded spaces with units, the parts of an observation, and the names of array types.
 
-Shapes: `S` state, `G` goal, `D` design.
+Shapes: `O` observation, `S` state, `G` goal, `D` design; `...` any leading axes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,11 +17,20 @@ Booleans = NDArray[np.bool_]
 Slots = NDArray[np.intp]
 Frame = NDArray[np.uint8]
 """A picture, (height, width, 3), in RGB."""
+Span: TypeAlias = slice
+"""Where neighbouring entries of a space are found on the last axis of an array."""
 
 
 @dataclass(frozen=True)
 class Box:
-    """A bounded space whose every entry has a name, a unit and a range in that unit."""
+    """A bounded space whose every entry has a name, a unit and a range in that unit.
+
+    Code refers to entries by name, so that their order is spelled once, where the space is defined:
+
+        STATE = Box.of(puck_x=(-6.0, 30.0, "m"), puck_y=(-6.0, 30.0, "m"), distance=(0.0, 9.0, "m"))
+        PUCK, DISTANCE = STATE.slice("puck_x", "puck_y"), STATE.index("distance")
+        state[:, PUCK] = 0.0
+    """
 
     names: tuple[str, ...]
     low: tuple[float, ...]
@@ -31,6 +40,8 @@ class Box:
     def __post_init__(self) -> None:
         if not len(self.names) == len(self.low) == len(self.high) == len(self.units):
             raise ValueError(f"names, low, high and units differ in length: {self}")
+        if len(set(self.names)) < len(self.names):
+            raise ValueError(f"two entries have the same name: {', '.join(self.names)}")
 
     @classmethod
     def of(cls, **entries: tuple[float, float, str]) -> Box:
@@ -42,6 +53,49 @@ class Box:
     def size(self) -> int:
         """Number of entries."""
         return len(self.names)
+
+    def index(self, name: str) -> int:
+        """Return the position of the entry `name`.
+
+        Raises:
+            ValueError: there is no such entry.
+        """
+        if name not in self.names:
+            raise ValueError(f"no entry '{name}' among: {', '.join(self.names)}")
+        return self.names.index(name)
+
+    def slice(self, *names: str) -> Span:
+        """Return the positions of the entries `names`, which are neighbours in this order.
+
+        Raises:
+            ValueError: there is no such entry, or others are between them.
+        """
+        positions = [self.index(name) for name in names]
+        if not positions or positions != list(range(positions[0], positions[0] + len(positions))):
+            raise ValueError(f"not neighbours in this order: {', '.join(names) or 'no names'}")
+        return slice(positions[0], positions[-1] + 1)
+
+    def group(self, prefix: str) -> Span:
+        """Return the positions of all entries whose names start with `prefix`; they are neighbours.
+
+        Raises:
+            ValueError: no entry's name does, or others are between them.
+        """
+        return self.slice(*(name for name in self.names if name.startswith(prefix)))
+
+    def part(self, *names: str) -> Box:
+        """Return the space of the entries `names` alone, in this order.
+
+        Raises:
+            ValueError: there is no such entry.
+        """
+        chosen = [self.index(name) for name in names]
+        return Box(
+            names,
+            low=tuple(self.low[index] for index in chosen),
+            high=tuple(self.high[index] for index in chosen),
+            units=tuple(self.units[index] for index in chosen),
+        )
 
     @property
     def bounds(self) -> tuple[Floats, Floats]:
@@ -63,12 +117,22 @@ class Box:
         return rng.uniform(*self.bounds, size=(count, self.size))
 
 
+class Observed(NamedTuple):
+    """The parts of one observation (O,), or of many (..., O); each part keeps the leading axes."""
+
+    state: NDArray[Any]
+    """(..., S) in the state space's units."""
+    goal: NDArray[Any]
+    """(..., G) in the goal space's units; an instance starts with the goal, so indices are the same."""
+    design: NDArray[Any]
+    """(..., D) in [-1, 1]."""
+    phase: NDArray[Any]
+    """(..., 3) design phase?, control phase?, elapsed fraction of the horizon."""
+
+
 @dataclass(frozen=True)
 class Layout:
-    """Where each part of an observation lies: [state | goal | design | phase].
-
-    The phase part is (design phase?, control phase?, elapsed fraction of the horizon).
-    """
+    """Where each part of an observation is found: [state | goal | design | phase]."""
 
     state: slice
     goal: slice
@@ -89,6 +153,10 @@ class Layout:
     def size(self) -> int:
         """Length of an observation."""
         return self.phase.stop
+
+    def split(self, observation: NDArray[Any]) -> Observed:
+        """Return the parts of `observation` (..., O), as views of it: `split(seen).state[..., STATE.index("tilt")]`."""
+        return Observed(*(observation[..., part] for part in (self.state, self.goal, self.design, self.phase)))
 
 
 @dataclass(frozen=True)

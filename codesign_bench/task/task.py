@@ -8,20 +8,21 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from types import MappingProxyType
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
 from codesign_bench.errors import UserError
 from codesign_bench.seeding import generator
 from codesign_bench.task.behaviour import Behaviour
+from codesign_bench.task.robot import DeploymentSpec
+from codesign_bench.task.scene import Constant
 from codesign_bench.task.simulator import Simulator, Soundness
 from codesign_bench.task.spaces import Booleans, Box, Floats, Layout, Quantity
 from codesign_bench.task.tool import ToolGraph, ToolPart
 
-if TYPE_CHECKING:
-    from codesign_bench.task.robot import DeployedSimulator, RobotTrials
-
+NOTHING_NAMED: Mapping[str, Any] = MappingProxyType({})
 EVALUATION_SEED = 20231106
 """Seed of every task's fixed evaluation instances; training never uses it (ours)."""
 
@@ -51,7 +52,22 @@ class Task(ABC):
     """All that differs between episodes: first the goal, then whatever the policies are not told as a goal."""
     goal_size: ClassVar[int]
     """How many leading entries of an instance are the goal."""
+    position_entries: ClassVar[tuple[str, ...]] = ()
+    """Names of the one or two entries of an instance that are a position, along x and y; empty: none is.
+
+    These are what a cutout region is cut out of, and what maps of instances show.
+    """
     state_space: ClassVar[Box]
+    reward_terms: ClassVar[Mapping[str, str]] = NOTHING_NAMED
+    """Name -> formula, with units, of each term that `Simulator.set_reward` adds up; empty: the task names none."""
+    success_conditions: ClassVar[Mapping[str, str]] = NOTHING_NAMED
+    """Name -> words, with units, for each condition of `Simulator.set_success`; empty: the task names none."""
+    success_steps: ClassVar[int] = 1
+    """Control steps in a row for which all of these conditions must hold."""
+    failure_condition: ClassVar[str] = ""
+    """When an episode is lost for good, in words with units; empty: never."""
+    scene: ClassVar[Mapping[str, Constant]] = NOTHING_NAMED
+    """Name -> number, with unit and source, of what the scene is made of: `constants(__name__)`."""
     outcome: ClassVar[Quantity | None] = None
     """What `Simulator.outcome` measures: how far the task got, whatever the reward."""
     soundness: ClassVar[Soundness | None] = None
@@ -65,8 +81,7 @@ class Task(ABC):
     @property
     def goal_space(self) -> Box:
         """The leading, visible part of the instance space."""
-        space, count = self.instance_space, self.goal_size
-        return Box(space.names[:count], space.low[:count], space.high[:count], space.units[:count])
+        return self.instance_space.part(*self.instance_space.names[: self.goal_size])
 
     @property
     def layout(self) -> Layout:
@@ -81,8 +96,32 @@ class Task(ABC):
         """Return the (num_evaluation_instances, I) instances on which every method is judged, always the same."""
         return self.sample_instances(generator(EVALUATION_SEED, self.name), self.num_evaluation_instances)
 
+    @property
+    def position_index(self) -> list[int]:
+        """Where an instance holds its position, in the order of `position_entries`.
+
+        Raises:
+            UserError: no entry is a position.
+        """
+        if not self.position_entries:
+            raise UserError(f"neither goals nor starts of task '{self.name}' are positions")
+        return [self.instance_space.index(name) for name in self.position_entries]
+
+    def in_region(self, instances: Floats) -> Booleans:
+        """Return which positions of instances (b, I) are in the training region, its border included.
+
+        By default the region is everything between the bounds of `position_entries`.
+
+        Raises:
+            UserError: no entry is a position.
+        """
+        index = self.position_index
+        low, high = (bound[index] for bound in self.instance_space.bounds)
+        inside: Booleans = np.all((low <= instances[:, index]) & (instances[:, index] <= high), axis=1)
+        return inside
+
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
-        """Tell which instances (b, I) lie in the cutout region, `fraction` of the training region (section 5.2).
+        """Return which instances (b, I) are in the cutout region, `fraction` of the training region (section 5.2).
 
         Raises:
             UserError: the task has no goal or start that is a position.
@@ -112,17 +151,9 @@ class Task(ABC):
         they may overlap.
 
         Raises:
-            UserError: the task does not tell.
+            UserError: the task does not say.
         """
-        raise UserError(f"task '{self.name}' does not tell what its tools are made of")
-
-    def gripper_handle(self) -> tuple[ToolPart, ...]:
-        """Return what a robot's gripper holds a printed tool by, beyond `tool_parts`, in the frame of the held point.
-
-        The first part touches the tool's node 0, every other one the part before it. None by default: the task has no
-        gripper, or the tool has a handle of its own.
-        """
-        return ()
+        raise UserError(f"task '{self.name}' does not say what its tools are made of")
 
     def script(self) -> Behaviour:
         """Return a designer and a controller written by hand, for pictures and checks: functions of the observation.
@@ -144,18 +175,7 @@ class Task(ABC):
                 may leave this argument out).
         """
 
-    def make_deployed_simulator(self, num_slots: int, arm: str) -> DeployedSimulator:
-        """Return a simulator with `num_slots` slots whose tools are held by `arm`, one of `deployment.robot.ARMS`.
-
-        Raises:
-            UserError: the task has none.
-        """
-        raise UserError(f"task '{self.name}' cannot be deployed on an arm")
-
-    def robot_trials(self) -> RobotTrials:
-        """Return the instances of the paper's evaluation on a real robot.
-
-        Raises:
-            UserError: the task has none.
-        """
-        raise UserError(f"task '{self.name}' cannot be deployed on an arm")
+    @property
+    def deployment(self) -> DeploymentSpec | None:
+        """How policies and tools are tried on a robot arm; None: they cannot be."""
+        return None

@@ -11,8 +11,8 @@ import pytest
 
 from codesign_bench import load_task, task_names
 from codesign_bench.fabrication.export import SOLID_FORMATS, file_content
-from codesign_bench.fabrication.solids import Solid, tool_solid, united
-from codesign_bench.task import BoxPart, Floats, PlanarPart, Simulator, Task, ToolPart, deployable_tasks
+from codesign_bench.fabrication.solids import Solid, handle_of, tool_solid, united
+from codesign_bench.task import BoxPart, Floats, PlanarPart, Simulator, Task, ToolPart, deployable_tasks, deployment_of
 
 trimesh = pytest.importorskip("trimesh")
 stats = pytest.importorskip("scipy.stats")
@@ -98,15 +98,14 @@ def _just_outside() -> Floats:
 def test_the_solid_is_what_the_engine_lets_collide(name: str) -> None:
     task = load_task(name)
     simulator = task.make_simulator(1)
-    handle = task.gripper_handle()
     for design in random_designs(task):
-        assert_same(tool_solid(task, design), (*engine_shapes(simulator, task, design), *handle))
+        assert_same(tool_solid(task, design), (*engine_shapes(simulator, task, design), *handle_of(task)))
 
 
 @pytest.mark.parametrize("name", deployable_tasks())
 def test_the_arm_holds_the_solid_handle_included(name: str) -> None:
     task = load_task(name)
-    simulator = task.make_deployed_simulator(1, "panda")
+    simulator = deployment_of(task).make_simulator(1, "panda")
     for design in random_designs(task)[:4]:
         assert_same(tool_solid(task, design), engine_shapes(simulator, task, design))
 

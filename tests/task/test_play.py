@@ -7,7 +7,7 @@ import pytest
 
 from codesign_bench.task import Behaviour, Task, load_task
 from codesign_bench.task.behaviours import GivenDesigns, Idle
-from codesign_bench.task.episodes import Episodes, Tradeoff
+from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.play import designed, first_observations, play
 
 GOALS = np.array([[1.0], [0.5]])
@@ -78,17 +78,3 @@ def test_first_observations_show_the_goal_in_the_design_phase(task: Task) -> Non
     observation, layout = first_observations(Episodes(task, 2), GOALS), task.layout
     np.testing.assert_allclose(observation[:, layout.goal], GOALS)
     assert observation[:, layout.phase].tolist() == [[1.0, 0.0, 0.0]] * 2
-
-
-def test_named_terms_add_up_to_the_reward_with_the_tradeoff_among_them(task: Task) -> None:
-    simulator = task.make_simulator(3)
-    simulator.set_reward(np.array([0, 2]), progress=np.array([1.0, 2.0]), slack=-0.25)
-    assert simulator.reward.tolist() == [0.75, 0.0, 1.75]
-    assert {name: values.tolist() for name, values in simulator.reward_terms.items()} == {
-        "progress": [1.0, 0.0, 2.0],
-        "slack": [-0.25, 0.0, -0.25],
-    }
-    episodes = Episodes(task, 2, Tradeoff(alpha=1.0, scale=2.0))
-    for turn in play(episodes, GivenDesigns(np.full((2, 1), -1.0), Idle(task)), GOALS):
-        if turn.step == 1:  # material 0.1: K (1 - alpha 0.1) = 1.8
-            np.testing.assert_allclose(episodes.reward_terms["tradeoff"], [1.8, 1.8])

@@ -5,6 +5,7 @@ Shapes: `b` episodes played side by side, `T` control steps, `O` observation, `D
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -15,7 +16,10 @@ from scipy import stats
 from codesign_bench.errors import UserError
 from codesign_bench.method import Problem
 from codesign_bench.task import Booleans, Floats, Singles, Task, load_task, task_names
-from codesign_bench.task.episodes import Episodes, Tradeoff
+from codesign_bench.task.behaviours import RandomBehaviour
+from codesign_bench.task.episodes import TRADEOFF_TERM, Episodes, Tradeoff
+from codesign_bench.task.play import Turn
+from codesign_bench.task.play import play as library_play
 
 EPISODES = 4
 STEPS = 60
@@ -33,9 +37,7 @@ def task(request: pytest.FixtureRequest) -> Task:
 @pytest.fixture
 def cutout_task(task: Task) -> Task:
     """Every task that has a cutout region."""
-    try:
-        task.in_cutout(task.evaluation_instances(), 0.5)
-    except UserError:
+    if not task.position_entries:
         pytest.skip("no goal or start of this task is a position")
     return task
 
@@ -152,6 +154,29 @@ def test_an_episode_ends_once_within_the_horizon(task: Task) -> None:
     assert not recording.truncated[: task.horizon - 1].any()
 
 
+def test_the_docstring_has_the_sections_that_a_reader_looks_for_and_states_the_sizes(task: Task) -> None:
+    text = " ".join(str(type(task).__doc__).split())
+    for section in ("Action space", "Observation", "Goal space", "Reward", "Starting state", "Episode end"):
+        assert f" {section} " in text
+    for part, space in {
+        "Design": task.design_space,
+        "Control": task.control_space,
+        "State": task.state_space,
+        "Goal": task.goal_space,
+    }.items():
+        assert f"{part}, {space.size}: " in text
+
+
+def test_everything_in_a_scene_has_a_unit_and_a_source(task: Task) -> None:
+    assert task.scene
+    assert [name for name, constant in task.scene.items() if not (constant.unit and constant.source)] == []
+
+
+def test_names_of_an_observation_are_different(task: Task) -> None:
+    told = [*task.state_space.names, *task.goal_space.names, *task.design_space.names, *task.layout.PHASE_NAMES]
+    assert len(set(told)) == len(told)
+
+
 def test_spaces_agree_in_size(task: Task) -> None:
     designs = task.design_space.from_unit(script_for(task).designs)
     assert len(task.tool_graph.parameter_nodes) == task.design_space.size
@@ -195,6 +220,28 @@ def test_extreme_actions_act_like_the_bounds(task: Task) -> None:
     assert_equal(play(Episodes(task, EPISODES), wild, slots), play(Episodes(task, EPISODES), tame, slots))
 
 
+def test_a_task_has_a_region_and_a_cutout_if_and_only_if_it_names_a_position(task: Task) -> None:
+    instances = task.evaluation_instances()
+    if task.position_entries:
+        assert len(task.position_entries) <= 2
+        assert set(task.position_entries) <= set(task.instance_space.names)
+        assert task.in_region(task.sample_instances(np.random.default_rng(1), SAMPLES)).all()
+        assert not task.in_cutout(instances, 0.0).any()
+    else:
+        for refused in (lambda: task.in_region(instances), lambda: task.in_cutout(instances, 0.5)):
+            with pytest.raises(UserError, match=f"neither goals nor starts of task '{task.name}' are positions"):
+                refused()
+
+
+def test_the_region_ends_where_instances_do(cutout_task: Task) -> None:
+    low, high = cutout_task.instance_space.bounds
+    index, beyond = cutout_task.position_index, 1e-6 * (high - low)
+    for corner in (high + beyond, low - beyond):
+        outside = 0.5 * (low + high)
+        outside[index] = corner[index]
+        assert not cutout_task.in_region(outside[None])[0]
+
+
 @pytest.mark.parametrize("fraction", FRACTIONS)
 def test_training_never_sees_the_cutout_and_the_rest_as_before(cutout_task: Task, fraction: float) -> None:
     everywhere = cutout_task.sample_instances(np.random.default_rng(1), SAMPLES)
@@ -227,12 +274,6 @@ def test_material_and_effort_are_fractions_that_reach_one(task: Task) -> None:
     assert task.effort(np.zeros((1, task.control_space.size)))[0] < 0.5
 
 
-def test_the_tradeoff_reward_by_hand() -> None:
-    material, effort = np.array([0.5, 0.0, 1.0]), np.array([0.2, 0.0, 1.0])
-    # 2 [1 - (0.3 * 0.5 + 0.7 * 0.2)] = 2 (1 - 0.29) = 1.42; nothing used earns K; everything used earns nothing.
-    np.testing.assert_allclose(Tradeoff(alpha=0.3, scale=2.0).reward(material, effort), [1.42, 2.0, 0.0], atol=1e-12)
-
-
 def test_the_tradeoff_reward_is_added_to_every_control_step(task: Task) -> None:
     script, slots = script_for(task), np.arange(EPISODES)
     plain = play(Episodes(task, EPISODES), script, slots)
@@ -244,6 +285,46 @@ def test_the_tradeoff_reward_is_added_to_every_control_step(task: Task) -> None:
     for step in range(len(script.controls)):
         expected = 0.5 * (1.0 - 0.6 * material - 0.4 * task.effort(script.controls[step]))
         np.testing.assert_allclose((weighed.reward - plain.reward)[step], expected * running[step], atol=1e-9)
+
+
+def steps_of(task: Task, episodes: Episodes) -> Iterator[Turn]:
+    """Yield the control steps of a random behaviour, then those of the task's script."""
+    instances = task.evaluation_instances()[:EPISODES]
+    for behaviour in (RandomBehaviour(task, np.random.default_rng(6)), task.script()):
+        yield from (turn for turn in library_play(episodes, behaviour, instances) if turn.step > 0)
+
+
+def test_the_terms_of_a_reward_are_those_declared_finite_and_add_up(task: Task) -> None:
+    episodes = Episodes(task, EPISODES, Tradeoff(alpha=0.6, scale=0.5))
+    for turn in steps_of(task, episodes):
+        terms = [values[turn.slots] for values in episodes.reward_terms.values()]
+        assert tuple(episodes.reward_terms) == (*task.reward_terms, TRADEOFF_TERM)
+        assert np.isfinite(terms).all()
+        np.testing.assert_array_equal(sum(terms[1:], start=terms[0]), turn.reward)
+
+
+def test_success_is_that_all_declared_conditions_have_held_together_for_the_declared_steps(task: Task) -> None:
+    episodes, held_for = Episodes(task, EPISODES), np.zeros(EPISODES, dtype=int)
+    solved = 0
+    for turn in steps_of(task, episodes):
+        conditions = episodes.simulator.conditions
+        assert tuple(conditions) == tuple(task.success_conditions)
+        met = np.all([holds[turn.slots] for holds in conditions.values()], axis=0)
+        held_for[turn.slots] = np.where(met, held_for[turn.slots] * (turn.step > 1) + 1, 0)
+        np.testing.assert_array_equal(episodes.success(turn.slots), held_for[turn.slots] >= task.success_steps)
+        assert task.failure_condition or not episodes.simulator.failure.any()
+        solved += int(episodes.success(turn.slots).sum())
+    assert solved > 0, "no episode was solved: the test shows little"
+
+
+def test_a_new_episode_remembers_nothing_of_the_last(task: Task) -> None:
+    episodes = Episodes(task, EPISODES)
+    for _ in steps_of(task, episodes):
+        pass
+    simulator, slots = episodes.simulator, np.arange(1)
+    episodes.begin(slots, task.evaluation_instances()[:1])
+    told = [simulator.reward, *simulator.reward_terms.values(), simulator.success, simulator.failure]
+    assert not any(values[0] for values in [*told, *simulator.conditions.values(), simulator.met_steps])
 
 
 def test_a_tool_is_made_of_parts_that_its_design_changes(task: Task) -> None:

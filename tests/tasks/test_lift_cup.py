@@ -6,7 +6,6 @@ Nothing here depends on a tuned number: all of them are read from the task's mod
 from __future__ import annotations
 
 import inspect
-import re
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
@@ -16,7 +15,7 @@ import pybullet
 import pytest
 
 from codesign_bench.registry import load_module
-from codesign_bench.task import Behaviour, Floats, load_task
+from codesign_bench.task import Floats, load_task
 from codesign_bench.task.episodes import Episodes
 
 lift: Any = load_module("tasks", "lift_cup")
@@ -24,8 +23,6 @@ bullet: Any = inspect.getmodule(lift.BulletSimulator)
 SLOT = np.array([0])
 SMALL, MIDDLE, WIDE = ((0.3, 0.6), (0.5, 0.8), (0.9, 0.9))
 """Cups (scales of width and height); the paper made tools for (0.3, 0.6) and (0.5, 0.8), too."""
-SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
-"""A title in the docstring and the indented text below it."""
 
 
 @dataclass
@@ -101,50 +98,6 @@ def corners_of_boxes(boxes: Any) -> Floats:
 def all_corners() -> Floats:
     """Return the (32, 5) corners of the design space, normalised."""
     return np.array(list(product((-1.0, 1.0), repeat=5)))
-
-
-def test_the_docstring_tells_the_constants() -> None:
-    task = load_task("lift_cup")
-    text = inspect.cleandoc(str(task.__doc__))
-    sections = {title: " ".join(body.split()) for title, body in SECTION.findall(text)}
-    design, goals, state, room = task.design_space, task.goal_space, task.state_space, lift.WORKSPACE
-    degrees = {name: f"{np.rad2deg(np.arccos(getattr(lift, name))):.0f} degrees" for name in ("UPRIGHT", "TIPPED")}
-    for title, numbers in {
-        "Action space": (f"+-{lift.MAX_MOVE:g} m", f"{lift.MAX_MOVE / lift.CLOCK.control_period * 5:.1f} m/s"),
-        "Observation": (
-            ", ".join(f"{low:g} .. {high:g}" for low, high in zip(room.low, room.high, strict=True)),
-            f"| {state.low[16]:g} .. {state.high[16]:g} |",
-            f"| {goals.low[0]:g} .. {goals.high[0]:g} and {goals.low[1]:g} .. {goals.high[1]:g} |",
-        ),
-        "Design space": (
-            f"distance {design.low[0]:g} to {design.high[0]:g} m",
-            f"tilt +-{np.rad2deg(design.high[1]):.0f} degrees",
-            f"width {design.low[2]:g} to {design.high[2]:g} m",
-            f"length {design.low[3]:g} to {design.high[3]:g} m",
-            f"height {design.low[4]:g} to {design.high[4]:g} m",
-        ),
-        "Goal space": (f"{goals.low[0]:g} to {goals.high[0]:g}", f"{goals.low[1]:g} to {goals.high[1]:g}", "0.18 m"),
-        "Reward": (
-            f"{lift.LIFT_WEIGHT:g} h - {lift.FIT_WEIGHT:g} d + f - {-lift.TABLE.slack_reward:g} per control step",
-            f"+{lift.TABLE.success_reward:g} on success",
-            f"exp(-distance / {lift.FIT_LENGTH:g} m)",
-            f"{1000.0 * lift.PLAY:g} mm",
-            f"starts at {lift.START_POTENTIAL:g}",
-        ),
-        "Starting state": (
-            f"(0, {lift.CUP_START_Y:g})",
-            "({:g}, {:g}, {:g})".format(*lift.TOOL_START),
-            f"{1000.0 * lift.TOOL_CLEARANCE:g} mm",
-        ),
-        "Episode end": (
-            f"{lift.SUCCESS_HEIGHT:g} m",
-            f"within {degrees['UPRIGHT']}",
-            f"more than {degrees['TIPPED']}",
-            f"{task.horizon} control steps",
-            f"1/{1.0 / task.control_period:g} s",
-        ),
-    }.items():
-        assert [number for number in numbers if number not in sections[title]] == [], title
 
 
 def test_a_level_fork_by_hand() -> None:
@@ -223,7 +176,7 @@ def test_prongs_under_the_rim_lift_a_cup_and_others_do_not(cup: tuple[float, flo
     fits = play(cup, fork(cup, 0.5 * lift.RIM_WIDTH))
     assert fits.success
     assert fits.simulator.outcome[0] > lift.SUCCESS_HEIGHT
-    assert sum(fits.reward) > lift.TABLE.success_reward + lift.LIFT_WEIGHT * lift.SUCCESS_HEIGHT
+    assert sum(fits.reward) > lift.SUCCESS_REWARD + lift.LIFT_WEIGHT * lift.SUCCESS_HEIGHT
     assert not play(cup, fork(cup, -0.005)).success, "too close together for the walls"
     if cup != WIDE:  # No fork is too wide for the widest cup.
         assert not play(cup, fork(cup, lift.RIM_WIDTH + 0.005)).success, "too wide for the rim"
@@ -283,7 +236,7 @@ def test_rewards_add_up_to_the_potential_reached() -> None:
     for clearance in (0.5 * lift.RIM_WIDTH, -0.01):
         outcome = play(MIDDLE, fork(MIDDLE, clearance))
         reached = outcome.simulator.potential[0] - lift.START_POTENTIAL
-        expected = reached + lift.TABLE.slack_reward * len(outcome.reward) + 10.0 * outcome.success
+        expected = reached + lift.SLACK_REWARD * len(outcome.reward) + 10.0 * outcome.success
         assert sum(outcome.reward) == pytest.approx(expected, abs=1e-9)
         assert sum(outcome.reward) < 16.0
 
@@ -320,20 +273,3 @@ def test_the_observation_tells_what_the_tool_lacks_to_fit() -> None:
     assert state["prongs_to_rim_z"] == pytest.approx(0.136 - 0.07, abs=1e-6)
     assert state["prongs_to_cup_y"] == pytest.approx(1.65 - 1.42, abs=1e-6)
     assert state["cup_z_axis_z"] == 1.0
-
-
-def test_the_script_lifts_cups_of_every_corner_and_random_tools_rarely() -> None:
-    task = load_task("lift_cup")
-    cups = np.array(list(product((0.3, 0.9), (0.6, 0.9))))
-    from codesign_bench.evaluation.evaluate import evaluate
-
-    assert evaluate(task, task.script(), instances=cups).successes.all()
-
-    class Random(Behaviour):
-        def design(self, observation: Any) -> Any:
-            return np.random.default_rng(0).uniform(-1.0, 1.0, size=(len(observation), 5)).astype(np.float32)
-
-        def act(self, observation: Any) -> Any:
-            return task.script().act(observation)
-
-    assert 0.0 < evaluate(task, Random(), instances=task.evaluation_instances()[:32]).successes.mean() < 0.35

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from codesign_bench import load_task
+from codesign_bench.task import deployment_of
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.robot import IDEAL, PANDA, ArmReport
 
@@ -23,7 +24,7 @@ MIDDLE = np.array([[0.1, 0.65]])
 def started(name: str = "fetch_cube", instance: np.ndarray = MIDDLE) -> Any:
     """Return episodes of a task on a Panda, right after the design step with the tool in the middle of its space."""
     task = load_task(name)
-    episodes = Episodes(task, 1, simulator=task.make_deployed_simulator(1, PANDA))
+    episodes = Episodes(task, 1, simulator=deployment_of(task).make_simulator(1, PANDA))
     episodes.begin(SLOT, instance)
     episodes.design(SLOT, np.zeros((1, task.design_space.size)))
     return episodes
@@ -127,7 +128,7 @@ def test_a_hand_that_touches_something_fixed_is_counted() -> None:
 
 def test_the_gantry_reports_no_incident() -> None:
     task = load_task("fetch_cube")
-    episodes = Episodes(task, 1, simulator=task.make_deployed_simulator(1, IDEAL))
+    episodes = Episodes(task, 1, simulator=deployment_of(task).make_simulator(1, IDEAL))
     episodes.begin(SLOT, MIDDLE)
     episodes.design(SLOT, np.zeros((1, 11)))
     episodes.control(SLOT, np.zeros((1, 3)))

@@ -5,8 +5,6 @@ Nothing here depends on a tuned number: all of them are read from the task's mod
 
 from __future__ import annotations
 
-import inspect
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise, product
@@ -27,8 +25,6 @@ SLOT = np.array([0])
 STRAIGHT = np.array([[-0.25, -0.25, -0.25, 0.0, 0.0]])
 """A straight tool, normalised: short enough to go behind the puck, long enough to push it to far goals on the left."""
 IDLE = np.zeros((1, 2))
-SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
-"""A title in the docstring and the indented text below it."""
 
 
 @dataclass
@@ -93,8 +89,10 @@ def stay(observation: Floats) -> Floats:
 
 def push_left(observation: Floats) -> Floats:
     """Bring the tip of a straight tool to the right of the puck, push left, and stop near the goal."""
-    puck, base, to_goal = observation[0:2], observation[4:6], observation[6:8]
-    length = load_task("push").design_space.from_unit(STRAIGHT)[0, :3].sum()
+    task = load_task("push")
+    state = task.layout.split(observation).state
+    puck, base, to_goal = state[push.PUCK], state[push.BASE], state[push.PUCK_TO_GOAL]
+    length = task.design_space.from_unit(STRAIGHT)[0, task.design_space.group("link_")].sum()
     behind = puck + np.array([REACH + length + 0.2, 0.0])
     aligned = abs(base[1] - puck[1]) < 0.05
     if not aligned:  # First to the right, where the tool is clear of the puck, then to the puck's height.
@@ -121,46 +119,6 @@ def many_designs(count: int) -> Floats:
     space = load_task("push").design_space
     inside = np.random.default_rng(7).uniform(-1.0, 1.0, size=(count, space.size))
     return space.from_unit(np.vstack([list(product((-1.0, 1.0), repeat=space.size)), inside]))
-
-
-def test_the_docstring_tells_the_constants() -> None:
-    task = load_task("push")
-    text = inspect.cleandoc(str(task.__doc__))
-    sections = {title: " ".join(body.split()) for title, body in SECTION.findall(text)}
-    (near, far), goals, state = push.GOAL_DISTANCE, task.goal_space, task.state_space
-    for title, numbers in {
-        "Action space": (f"+-{push.MAX_SPEED:g} m/s",),
-        "Observation": (
-            f"| {state.low[0]:g} .. {state.high[0]:g} |",
-            f"| {state.low[2]:g} .. {state.high[2]:g} |",
-            f"| {state.low[6]:g} .. {state.high[6]:g} |",
-            f"| {goals.low[0]:g} .. {goals.high[0]:g} and {goals.low[1]:g} .. {goals.high[1]:g} |",
-        ),
-        "Goal space": (f"{near:g} to {far:g} m",),
-        "Reward": (f"{-push.TABLE.slack_reward:g} per control step", f"+{push.SUCCESS_REWARD:g} on success"),
-        "Starting state": (
-            "({:g}, {:g})".format(*push.PUCK_START),
-            "({:g}, {:g})".format(*push.TOOL_START),
-            f"{push.START_CLEARANCE:g} m",
-        ),
-        "Episode end": (
-            f"within {push.GOAL_RADIUS:g} m",
-            f"{push.REST_SPEED:g} m/s",
-            f"{push.REST_STEPS} control steps",
-            f"{task.horizon} control steps of 1/{1.0 / task.control_period:g} s",
-        ),
-    }.items():
-        assert [number for number in numbers if number not in sections[title]] == [], title
-
-
-def test_chain_points_by_hand() -> None:
-    quarter = np.pi / 2.0
-    straight = push.chain_points(np.array([[1.0, 2.0, 3.0, 0.0, 0.0]]), 0.0)
-    np.testing.assert_allclose(straight, [[[0, 0], [1, 0], [3, 0], [6, 0]]], atol=1e-12)
-    stairs = push.chain_points(np.array([[1.0, 2.0, 3.0, quarter, -quarter]]), 0.0)
-    np.testing.assert_allclose(stairs, [[[0, 0], [1, 0], [1, 2], [4, 2]]], atol=1e-12)
-    hook = push.chain_points(np.array([[1.0, 2.0, 3.0, quarter, quarter]]), np.pi)
-    np.testing.assert_allclose(hook, [[[0, 0], [-1, 0], [-1, -2], [2, -2]]], atol=1e-12)
 
 
 def test_no_tool_starts_on_the_puck() -> None:
@@ -194,8 +152,9 @@ def test_the_simulator_starts_tools_where_the_geometry_says() -> None:
     episodes.begin(slots, np.tile(goal_at(push.GOAL_DISTANCE[0], 0.0), (len(designs), 1)))
     episodes.design(slots, task.design_space.to_unit(designs))
     shifts = push.start_shift(push.chain_points(designs, push.FIRST_LINK_ANGLE))
-    np.testing.assert_allclose(episodes.observation[:, 4], push.TOOL_START[0] + shifts, atol=1e-5)
-    np.testing.assert_allclose(episodes.observation[:, 5], push.TOOL_START[1], atol=1e-5)
+    base = task.layout.split(episodes.observation).state[:, push.BASE]
+    np.testing.assert_allclose(base[:, 0], push.TOOL_START[0] + shifts, atol=1e-5)
+    np.testing.assert_allclose(base[:, 1], push.TOOL_START[1], atol=1e-5)
     for slot in slots:  # pymunk's own shapes leave the clearance, too.
         simulator: Any = episodes.simulator
         space: pymunk.Space = simulator.spaces[slot]
@@ -232,7 +191,7 @@ def test_nothing_happens_to_an_idle_tool() -> None:
     assert not outcome.terminated
     assert len(outcome.reward) == task.horizon
     np.testing.assert_allclose(outcome.puck[-1], push.PUCK_START, atol=1e-9)
-    assert sum(outcome.reward) == pytest.approx(task.horizon * push.TABLE.slack_reward)
+    assert sum(outcome.reward) == pytest.approx(task.horizon * push.SLACK_REWARD)
 
 
 def speed_for(distance: float) -> float:
@@ -267,20 +226,8 @@ def test_rewards_add_up_to_the_share_of_the_way_made(prepare: Callable[[pymunk.S
     outcome = play(goal, push_left, prepare)
     first, last = (float(np.linalg.norm(puck - goal[0])) for puck in (outcome.puck[0], outcome.puck[-1]))
     steps = len(outcome.reward)
-    expected = (first - last) / first + push.TABLE.slack_reward * steps + push.SUCCESS_REWARD * outcome.success
+    expected = (first - last) / first + push.SLACK_REWARD * steps + push.SUCCESS_REWARD * outcome.success
     assert sum(outcome.reward) == pytest.approx(expected, abs=1e-9)
-
-
-def test_half_the_physics_step_leaves_the_outcome_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    goals = [goal_at(distance, np.pi) for distance in push.GOAL_DISTANCE]
-    coarse = [play(goal, push_left, as_built) for goal in goals]
-    monkeypatch.setattr(push, "CLOCK", push.CLOCK.refined(2))
-    fine = [play(goal, push_left, as_built) for goal in goals]
-    for before, after in zip(coarse, fine, strict=True):
-        assert before.success
-        assert after.success
-        assert abs(len(before.reward) - len(after.reward)) <= 3  # Control steps.
-        np.testing.assert_allclose(before.puck[-1], after.puck[-1], atol=0.1)  # A tenth of the puck's radius.
 
 
 def test_nothing_explodes_or_tunnels_at_the_corners_of_the_design_space() -> None:

@@ -17,7 +17,7 @@ import pytest
 from scipy import stats
 
 from codesign_bench.evaluation.evaluate import evaluate
-from codesign_bench.task import Behaviour, Floats, Simulator, Soundness, Task, load_task, task_names
+from codesign_bench.task import Floats, Simulator, Soundness, Task, load_task, task_names
 from codesign_bench.task.episodes import Episodes
 
 SLOTS = 16
@@ -125,43 +125,6 @@ class _Refined(Task):
 def outcomes(task: Task, count: int) -> Floats:
     """Return the outcomes of the task's script on its first instances."""
     return evaluate(task, task.script(), instances=task.evaluation_instances()[:count]).outcomes
-
-
-def test_the_script_solves_some_instances_and_other_tools_change_what_it_reaches(task: Task) -> None:
-    instances = task.evaluation_instances()[:SCRIPTED_EPISODES]
-    own = evaluate(task, task.script(), instances=instances)
-    assert own.successes.any()
-    assert own.returns[own.successes].min() > own.returns[~own.successes].max(initial=-np.inf) - 1.0
-    same = np.repeat(instances[:1], SCRIPTED_EPISODES, axis=0)
-    tools = designs_for(np.random.default_rng(1), task, SCRIPTED_EPISODES)
-    assert len(np.unique(evaluate(task, _Given(task.script(), tools), instances=same).outcomes)) > 1
-
-
-class _Given(Behaviour):
-    """A script with other tools."""
-
-    def __init__(self, script: Behaviour, designs: Floats) -> None:
-        self.script, self.designs = script, designs.astype(np.float32)
-
-    def design(self, observation: np.ndarray) -> np.ndarray:
-        return self.designs
-
-    def act(self, observation: np.ndarray) -> np.ndarray:
-        return self.script.act(observation)
-
-
-def test_a_script_is_a_function_of_single_observations_and_of_batches(task: Task) -> None:
-    episodes, slots, script = Episodes(task, 3), np.arange(3), task.script()
-    episodes.begin(slots, task.evaluation_instances()[:3])
-    designs = script.design(episodes.observation)
-    np.testing.assert_array_equal(script.design(episodes.observation[1]), designs[1])
-    assert designs.shape == (3, task.design_space.size)
-    assert np.abs(designs).max() <= 1.0
-    episodes.design(slots, designs.astype(np.float64))
-    controls = script.act(episodes.observation)
-    np.testing.assert_array_equal(script.act(episodes.observation[1]), controls[1])
-    assert controls.shape == (3, task.control_space.size)
-    assert np.abs(controls).max() <= 1.0
 
 
 def test_looking_and_drawing_change_nothing(task: Task) -> None:

@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from codesign_bench.task import load_task, task_names
 from codesign_bench.task.envs import ToolEnv, environment_id, register_environments
@@ -63,13 +63,16 @@ def test_an_episode_is_one_design_step_and_then_control_until_the_horizon(task_n
 
     length = 0
     while not (terminated or truncated):
-        assert info == {}
+        assert "success" not in info
         observation, reward, terminated, truncated, info = env.step(0.0 * action)
+        assert sum(info["reward_terms"].values()) == pytest.approx(reward)
         length += 1
         assert observation in env.observation_space
     assert length <= task.horizon
     assert truncated is (length == task.horizon and not terminated)
     assert isinstance(info["success"], bool)
+    assert tuple(info["reward_terms"]) == tuple(task.reward_terms)
+    assert {type(value) for value in info["reward_terms"].values()} == {float}
     with pytest.raises(gymnasium.error.ResetNeeded):
         env.step(action)
 
@@ -107,6 +110,33 @@ def test_every_environment_of_a_batch_goes_as_it_does_alone(task_name: str) -> N
             assert bool(info.get("_success", np.zeros(count, bool))[index]) is ("success" in alone[4])
             assert bool(info.get("success", np.zeros(count, bool))[index]) is alone[4].get("success", False)
     assert any("success" in step[4] for step in batched), "no episode ended: the test shows nothing"
+
+
+def assert_same_info(first: dict[str, Any], second: dict[str, Any]) -> None:
+    """Assert that two infos of batched environments hold the same, masks included."""
+    assert first.keys() == second.keys()
+    for key, values in first.items():
+        if isinstance(values, dict):
+            assert_same_info(values, second[key])
+        else:
+            assert values.dtype == second[key].dtype
+            np.testing.assert_array_equal(values, second[key], err_msg=key)
+
+
+@EVERY_TASK
+def test_the_infos_of_a_batch_are_merged_as_gymnasium_merges_them(task_name: str) -> None:
+    count, length = 2, load_task(task_name).horizon + 5
+    batched: Any = gymnasium.make_vec(environment_id(task_name), num_envs=count)
+    alone: Any = SyncVectorEnv([lambda: ToolEnv(task_name)] * count)
+    rng, told = np.random.default_rng(2), set[str]()
+    for envs in (batched, alone):
+        envs.reset(seed=4)
+    for _ in range(length):
+        actions = rng.uniform(-1, 1, batched.action_space.shape).astype(np.float32)
+        expected = alone.step(actions)[4]
+        assert_same_info(batched.step(actions)[4], expected)
+        told |= set(expected)
+    assert told == {"reward_terms", "_reward_terms", "success", "_success"}
 
 
 @EVERY_TASK

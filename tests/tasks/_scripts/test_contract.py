@@ -1,0 +1,47 @@
+"""What every script promises: it solves something, whatever tool it is given it uses, and it is a pure function.
+
+Shapes: `b` episodes side by side, `D` design, `C` control.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.task import Task, load_task, task_names
+from codesign_bench.task.behaviours import GivenDesigns
+from codesign_bench.task.episodes import Episodes
+
+EPISODES = 12
+
+
+@pytest.fixture(params=task_names())
+def task(request: pytest.FixtureRequest) -> Task:
+    """Every task, one after the other."""
+    return load_task(request.param)
+
+
+def test_the_script_solves_some_instances_and_other_tools_change_what_it_reaches(task: Task) -> None:
+    instances = task.evaluation_instances()[:EPISODES]
+    own = evaluate(task, task.script(), instances=instances)
+    assert own.successes.any()
+    assert own.returns[own.successes].min() > own.returns[~own.successes].max(initial=-np.inf) - 1.0
+    same = np.repeat(instances[:1], EPISODES, axis=0)
+    inside = np.random.default_rng(1).uniform(-1.0, 1.0, size=(EPISODES, task.design_space.size))
+    tools = np.where(np.arange(EPISODES)[:, None] % 2 == 0, np.sign(inside), inside)  # Half of them at corners.
+    assert len(np.unique(evaluate(task, GivenDesigns(tools, task.script()), instances=same).outcomes)) > 1
+
+
+def test_a_script_is_a_function_of_single_observations_and_of_batches(task: Task) -> None:
+    episodes, slots, script = Episodes(task, 3), np.arange(3), task.script()
+    episodes.begin(slots, task.evaluation_instances()[:3])
+    designs = script.design(episodes.observation)
+    np.testing.assert_array_equal(script.design(episodes.observation[1]), designs[1])
+    assert designs.shape == (3, task.design_space.size)
+    assert np.abs(designs).max() <= 1.0
+    episodes.design(slots, designs.astype(np.float64))
+    controls = script.act(episodes.observation)
+    np.testing.assert_array_equal(script.act(episodes.observation[1]), controls[1])
+    assert controls.shape == (3, task.control_space.size)
+    assert np.abs(controls).max() <= 1.0

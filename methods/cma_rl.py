@@ -15,7 +15,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from codesign_bench.learning.actor import Actor, ActorPolicy, load_module_arrays
+from codesign_bench.learning.actor import Actor, ActorPolicy
+from codesign_bench.learning.checkpointing import load_module_arrays
 from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, paper_evolution
 from codesign_bench.learning.features import Features
 from codesign_bench.learning.gae import episode_returns

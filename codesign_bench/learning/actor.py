@@ -6,13 +6,13 @@ Shapes: `B` batch, `O` observation, `D` design, `C` control.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from codesign_bench.learning.checkpointing import module_arrays
 from codesign_bench.method import Policy
 from codesign_bench.task import Singles
 
@@ -73,17 +73,3 @@ class ActorPolicy(Policy):
         with torch.inference_mode():
             mean: Singles = distribution(torch.from_numpy(batch))[0].clamp(-1.0, 1.0).numpy()
         return mean if np.ndim(observation) == 2 else mean[0]
-
-
-def module_arrays(module: nn.Module) -> dict[str, Any]:
-    """Return copies of a module's parameters and buffers as arrays by name."""
-    return {name: tensor.detach().numpy().copy() for name, tensor in module.state_dict().items()}
-
-
-def load_module_arrays(module: nn.Module, arrays: Mapping[str, Any]) -> None:
-    """Put arrays from `module_arrays` back.
-
-    Raises:
-        RuntimeError: names or shapes differ from the module's.
-    """
-    module.load_state_dict({name: torch.from_numpy(np.array(array)) for name, array in arrays.items()})

@@ -18,7 +18,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from codesign_bench.learning.actor import Actor, ActorPolicy, load_module_arrays, module_arrays
+from codesign_bench.learning.actor import Actor, ActorPolicy
+from codesign_bench.learning.checkpointing import learner_arrays, load_learner_arrays
 from codesign_bench.learning.gae import episode_returns, generalized_advantages
 from codesign_bench.learning.ppo import (
     PolicyLoss,
@@ -35,7 +36,7 @@ from codesign_bench.learning.rollout_pool import Group, RolloutPool
 from codesign_bench.learning.value_networks import DesignValue, ValueNetwork
 from codesign_bench.method import BatchReport, Policy, Problem, State
 from codesign_bench.seeding import Streams
-from codesign_bench.task import Floats, Singles, Slots
+from codesign_bench.task import Singles, Slots
 
 CPU = torch.device("cpu")
 BLOCK = 64
@@ -335,31 +336,13 @@ class TwoPhaseLearner:
 
     def state(self) -> State:
         """Return parameters, normalisers, optimizers and the step count."""
-        arrays: dict[str, Any] = {}
-        for name, module in self.modules().items():
-            arrays |= {f"{name}.{key}": array for key, array in module_arrays(module).items()}
-        for name, optimizer in self.optimizers.items():
-            for index, values in optimizer.state_dict()["state"].items():
-                arrays |= {f"optimizer.{name}.{index}.{key}": value.numpy().copy() for key, value in values.items()}
-        return State(arrays, {"env_steps": self.env_steps})
+        return State(learner_arrays(self.modules(), self.optimizers), {"env_steps": self.env_steps})
 
     def load_state(self, state: State) -> None:
         """Go on from `state`."""
-        for name, module in self.modules().items():
-            load_module_arrays(module, _below(state.arrays, f"{name}."))
-        for name, optimizer in self.optimizers.items():
-            content = optimizer.state_dict()
-            values: dict[int, dict[str, Tensor]] = {}
-            for key, array in _below(state.arrays, f"optimizer.{name}.").items():
-                index, what = key.split(".")
-                values.setdefault(int(index), {})[what] = torch.from_numpy(np.array(array))
-            optimizer.load_state_dict({"state": values, "param_groups": content["param_groups"]})
+        load_learner_arrays(self.modules(), self.optimizers, state.arrays)
         self.env_steps = int(state.values["env_steps"])
 
 
 def _adam(parameters: list[nn.Parameter], learning_rate: float) -> torch.optim.Adam:
     return torch.optim.Adam([p for p in parameters if p.requires_grad], lr=learning_rate, fused=True)
-
-
-def _below(arrays: dict[str, Any], prefix: str) -> dict[str, Floats]:
-    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}

@@ -110,7 +110,7 @@ def joined(groups: Sequence[Trajectories]) -> Trajectories:
 
 
 class Collector:
-    """Rolls a policy out in its own batch of episodes; between batches it holds no simulator."""
+    """Rolls a policy out in the simulator that the problem lends."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -133,14 +133,13 @@ class Collector:
             given_designs: (S, D) designs to use instead of the actor's, one for all episodes of a slot.
         """
         task = self.problem.task
-        episodes = self.problem.make_episodes(num_slots)
         share = max(1, steps // num_slots)
         capacity = share + task.horizon + 1
         data = _empty(num_slots, capacity, task.layout.size, task.control_space.size, task.design_space.size)
         control_noise = rng.standard_normal((num_slots, capacity, task.control_space.size), dtype=np.float32)
         time = np.zeros(num_slots, dtype=np.intp)
         starting = np.ones(num_slots, dtype=bool)
-        with torch.inference_mode():
+        with torch.inference_mode(), self.problem.episodes(num_slots) as episodes:
             while True:
                 fresh = np.flatnonzero(starting & (time < share))
                 if fresh.size:

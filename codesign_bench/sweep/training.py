@@ -131,8 +131,9 @@ class CellRun:
         self._write_curve()
 
     def _judge(self) -> Evaluation:
-        problem = self.problem
-        return evaluate(problem.task, self.method.policy(), problem.tradeoff, problem.evaluation_instances())
+        problem, policy = self.problem, self.method.policy()
+        instances = problem.evaluation_instances()
+        return evaluate(problem.task, policy, problem.tradeoff, instances, problem.simulators)
 
     def _mark(self, index: int) -> int:
         """Return the environment steps at which evaluation `index` is due; 0 and the whole budget are marks."""

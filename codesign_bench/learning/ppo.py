@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from codesign_bench.learning.ppo_config import PPOConfig
 from codesign_bench.task import Slots
 
 LogProbs = Callable[[Slots], tuple[Tensor, Tensor]]
@@ -29,6 +30,11 @@ class PolicyLoss:
     kl_threshold: float
     """The policy's update ends when a minibatch's estimated KL divergence from the old policy exceeds this."""
     max_gradient_norm: float
+
+    @classmethod
+    def of(cls, config: PPOConfig, kl_threshold: float) -> PolicyLoss:
+        """Return the loss that `config` describes, with this limit of the divergence."""
+        return cls(config.clip_ratio, config.entropy_weight, kl_threshold, config.max_gradient_norm)
 
     def __call__(
         self, log_prob: Tensor, old_log_prob: Tensor, advantage: Tensor, entropy: Tensor

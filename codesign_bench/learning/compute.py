@@ -14,6 +14,7 @@ from torch import Tensor, nn
 
 from codesign_bench.learning.actor import Distribution
 from codesign_bench.learning.checkpointing import Modules, Optimizers
+from codesign_bench.learning.ppo_config import Precision
 
 CPU = torch.device("cpu")
 BLOCK = 64
@@ -26,7 +27,7 @@ class Compute:
     Networks live on the processor, where rollouts use them, and visit the device for the time of an update.
     """
 
-    def __init__(self, precision: str = "fp32", block: int = BLOCK) -> None:
+    def __init__(self, precision: Precision = "fp32", block: int = BLOCK) -> None:
         self.precision, self.block = precision, block
         self.device = CPU
 

@@ -25,6 +25,7 @@ from codesign_bench.machine import host_facts, package_versions
 from codesign_bench.method import load_method
 from codesign_bench.plugins import import_modules
 from codesign_bench.processes import EXIT_ORPHANED
+from codesign_bench.storage.checkpoint import remove_checkpoint
 from codesign_bench.storage.files import remove_partial_files
 from codesign_bench.storage.results import (
     CHECKPOINT_FILE,
@@ -132,7 +133,8 @@ def _run_and_record(cell: Cell, config: ResolvedConfig, folder: Path, content: d
         end(folder, content, FAILED, failure=failure(message, traceback.format_exc()), **reached)
         return EXIT_FAILED
     end(folder, content, DONE, env_steps=finished.env_steps, timings=finished.timings)
-    for name in (CHECKPOINT_FILE, PROGRESS_FILE, LOG_FILE, LOCK_FILE):
+    remove_checkpoint(folder / CHECKPOINT_FILE)
+    for name in (PROGRESS_FILE, LOG_FILE, LOCK_FILE):
         (folder / name).unlink(missing_ok=True)
     return EXIT_DONE
 

@@ -17,7 +17,7 @@ from codesign_bench.config.resolve import ResolvedConfig, differences
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores
 from codesign_bench.registry import IMPORTS_VARIABLE
-from codesign_bench.storage.checkpoint import load_checkpoint
+from codesign_bench.storage.checkpoint import check_checkpoint
 from codesign_bench.storage.results import (
     CHECKPOINT_FILE,
     CURVE_FILE,
@@ -64,7 +64,7 @@ def make_plan(cells: Sequence[Cell], out: Path, *, retry_failed: bool = False) -
         elif content is not None and content["status"] == FAILED and not retry_failed:
             plan.failed[cell] = content["failure"]["message"]
         else:
-            load_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is refused here, not in the middle
+            check_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is refused here, not in the middle
             plan.pending.append(cell)
     return plan
 

@@ -12,9 +12,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from codesign_bench.learning.checkpointing import module_arrays
 from codesign_bench.learning.explorer import Explorer, Sample
-from codesign_bench.method import Array, Policy
+from codesign_bench.learning.network_policy import NetworkPolicy
 from codesign_bench.task import Singles, Slots
 
 Distribution = Callable[[Tensor], tuple[Tensor, Tensor]]
@@ -73,23 +72,11 @@ class GaussianExplorer(Explorer):
         return _sample(self.actor.control, observation, noise)
 
 
-class ActorPolicy(Policy):
-    """An actor that acts with its means, clipped to [-1, 1]."""
+class ActorPolicy(NetworkPolicy):
+    """An actor that acts with its means."""
 
     def __init__(self, actor: Actor) -> None:
-        self.actor = actor
-
-    def design(self, observation: Singles) -> Singles:
-        """Return the mean design."""
-        return _mean(self.actor.design, observation)
-
-    def act(self, observation: Singles) -> Singles:
-        """Return the mean control."""
-        return _mean(self.actor.control, observation)
-
-    def tensors(self) -> dict[str, Array]:
-        """Return the actor's parameters and normalisers."""
-        return module_arrays(self.actor)
+        super().__init__(actor, lambda seen: actor.design(seen)[0], lambda seen: actor.control(seen)[0])
 
 
 def gaussian_log_prob(noise: Singles, log_std: Singles) -> Singles:
@@ -102,10 +89,3 @@ def _sample(distribution: Distribution, observation: Singles, noise: Singles) ->
     with torch.inference_mode():
         mean, log_std = (values.numpy() for values in distribution(torch.from_numpy(observation)))
     return Sample(mean + np.exp(log_std) * noise, {LOG_PROB: gaussian_log_prob(noise, log_std)})
-
-
-def _mean(distribution: Distribution, observation: Singles) -> Singles:
-    batch = np.atleast_2d(np.asarray(observation, dtype=np.float32))
-    with torch.inference_mode():
-        mean: Singles = distribution(torch.from_numpy(batch))[0].clamp(-1.0, 1.0).numpy()
-    return mean if np.ndim(observation) == 2 else mean[0]

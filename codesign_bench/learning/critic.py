@@ -26,7 +26,7 @@ class Estimates:
     advantage: Tensor
     """(n,)"""
     target: Tensor
-    """(n,) what the network shall put out: returns, normalised if it learns normalised returns."""
+    """(n,) what the network is trained to put out: returns, normalised if it learns normalised returns."""
     explained_variance: float
     """Share of the returns' variance that the network explains."""
 

@@ -42,9 +42,11 @@ class PolicyLoss:
         """Return loss () and the estimated KL divergence (Schulman's k3 estimator) for (m,) inputs."""
         log_ratio = log_prob - old_log_prob
         ratio = log_ratio.exp()
+        # The smaller of the two takes away what could be gained beyond the range, but keeps what is lost there: a step
+        # that went too far in the wrong direction is still corrected.
         clipped = ratio.clamp(1.0 - self.clip_ratio, 1.0 + self.clip_ratio)
         surrogate = torch.minimum(ratio * advantage, clipped * advantage).mean()
-        with torch.no_grad():
+        with torch.no_grad():  # Unbiased like -log_ratio, but never negative, which makes it steadier on few rows.
             divergence = float((ratio - 1.0 - log_ratio).mean())
         return -surrogate - self.entropy_weight * entropy, divergence
 
@@ -81,6 +83,8 @@ class PolicyUpdate:
         index = torch.from_numpy(rows).to(self.advantage.device)
         log_prob, entropy = self.log_probs(rows)
         loss, self.divergence = self.loss(log_prob, self.old_log_prob[index], self.advantage[index], entropy)
+        # Looked at before the step, so the step that would go further is not taken. Advantages belong to the policy that
+        # collected the batch and say little of one so far from it, so the rest of the batch is not used either.
         if self.divergence > self.loss.kl_threshold:
             self.stopped = True
             return

@@ -31,8 +31,9 @@ def generalized_advantages(
         gamma: discount of a step.
         gae_lambda: weight of longer estimates.
     """
-    # The sum over k of (gamma lambda)^k error[t + k], taken backwards so that each step uses the sum behind it. Bootstrapping
-    # ends with `terminated` alone, the sum with every episode: a cut-off episode has a future, but not the next one's.
+    # The sum over k of (gamma lambda)^k error[t + k], taken backwards so that each step uses the sum behind it. Only
+    # `terminated` ends bootstrapping, but every episode's end ends the sum: an episode that was cut off has a future,
+    # which is not the next episode.
     error = reward + gamma * next_value * ~terminated - value
     advantage = np.zeros_like(error)
     following = np.zeros(error.shape[0])

@@ -83,7 +83,7 @@ class PolicyUpdate:
         index = torch.from_numpy(rows).to(self.advantage.device)
         log_prob, entropy = self.log_probs(rows)
         loss, self.divergence = self.loss(log_prob, self.old_log_prob[index], self.advantage[index], entropy)
-        # Looked at before the step, so the step that would go further is not taken. Advantages belong to the policy that
+        # Checked before the step, so the one that would go further is not taken. Advantages belong to the policy that
         # collected the batch and say little of one so far from it, so the rest of the batch is not used either.
         if self.divergence > self.loss.kl_threshold:
             self.stopped = True

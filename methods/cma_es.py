@@ -121,20 +121,20 @@ class CmaEs(Method[Config]):
     def _play_each(self, plans: Floats, instances: Floats) -> tuple[Floats, Floats, Booleans]:
         """Return return, simulated steps and success, each (b,), of plans (b, X) on one instance (b, I) each."""
         task, slots = self.problem.task, np.arange(len(plans))
-        episodes = self.problem.make_episodes(len(slots))
         size = task.design_space.size
         controls = plans[:, size:].reshape(len(slots), task.horizon, task.control_space.size)
-        episodes.begin(slots, instances)
-        episodes.design(slots, plans[:, :size])
         returns, steps, active = np.zeros(len(slots)), np.ones(len(slots)), slots
-        for step in range(task.horizon):
-            reward, terminated, truncated = episodes.control(active, controls[active, step])
-            returns[active] += reward
-            steps[active] += 1.0
-            active = active[~(terminated | truncated)]
-            if not active.size:
-                break
-        return returns, steps, episodes.success(slots).copy()
+        with self.problem.episodes(len(slots)) as episodes:
+            episodes.begin(slots, instances)
+            episodes.design(slots, plans[:, :size])
+            for step in range(task.horizon):
+                reward, terminated, truncated = episodes.control(active, controls[active, step])
+                returns[active] += reward
+                steps[active] += 1.0
+                active = active[~(terminated | truncated)]
+                if not active.size:
+                    break
+            return returns, steps, episodes.success(slots).copy()
 
     def policy(self) -> Policy:
         """Return CMA-ES's mean as a policy."""

@@ -16,7 +16,8 @@ import torch
 from torch import Tensor, nn
 
 from codesign_bench.config.settings import Settings
-from codesign_bench.learning.actor import Actor, ActorPolicy, load_module_arrays
+from codesign_bench.learning.actor import Actor, ActorPolicy
+from codesign_bench.learning.checkpointing import load_module_arrays
 from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
 from codesign_bench.learning.features import Features
 from codesign_bench.learning.gae import episode_returns

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Iterable
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from codesign_bench.config.resolve import resolve
 from codesign_bench.method import Problem, load_method, method_names
 from codesign_bench.seeding import Streams
 from codesign_bench.task import load_task, task_names
+from codesign_bench.task.episodes import Tradeoff
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -21,7 +23,8 @@ EXAMPLE = ROOT / "tests" / "third_party"
 
 LINK = re.compile(r"\[[^\]]*\]\(([^)#]+)[^)]*\)")
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-GLOSSARY_ROW = re.compile(r"^\| `(\w+)` \|", re.MULTILINE)
+GLOSSARY_ROW = re.compile(r"^\| `([\w<>]+)` \|", re.MULTILINE)
+"""A row explains one value, or all whose names differ where it says `<...>`."""
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -63,15 +66,27 @@ def test_the_readme_uses_names_that_exist() -> None:
     assert [name for name in used if not hasattr(codesign_bench, name)] == []
 
 
+def unexplained(names: Iterable[str], page: str) -> list[str]:
+    """Return those of `names` that no row of a glossary on the page explains."""
+    patterns = [re.sub(r"<\w+>", r"\\w+", row) for row in GLOSSARY_ROW.findall(page)]
+    return [name for name in names if not any(re.fullmatch(pattern, name) for pattern in patterns)]
+
+
+def test_a_row_explains_what_it_names_and_nothing_else() -> None:
+    page = "| name | meaning |\n| --- | --- |\n| `kl` | divergence |\n| `reward_<term>` | a part |\n"
+    assert unexplained(["kl", "reward_progress", "reward_", "reward", "kl_2"], page) == ["reward_", "reward", "kl_2"]
+
+
 @pytest.mark.parametrize("name", method_names())
 def test_every_logged_value_is_explained_on_the_methods_page(name: str) -> None:
     method_class, task_name = load_method(name), task_names()[0]
     config = resolve(method_class, task_name, "quick").method
     small = {"batch_size": 320, "minibatch_size": 100, "epochs": 1, "episodes_per_candidate": 1, "popsize": 2}
     config = replace(config, **{key: value for key, value in small.items() if key in {f.name for f in fields(config)}})
-    report = method_class(Problem(load_task(task_name)), config, Streams(0)).train(320)
+    problem = Problem(load_task(task_name), tradeoff=Tradeoff(alpha=0.5, scale=1.0))
+    report = method_class(problem, config, Streams(0)).train(320)
     page = ROOT / "docs" / "methods" / f"{name}.md"
     text = page.read_text(encoding="utf-8")
     if "two_phase_ppo.md" in text:
         text += (page.parent / "two_phase_ppo.md").read_text(encoding="utf-8")
-    assert set(report.metrics) <= set(GLOSSARY_ROW.findall(text))
+    assert unexplained(report.metrics, text) == []

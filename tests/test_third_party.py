@@ -1,7 +1,8 @@
-"""Another package's task and method behave like built-in ones: installed, or named by `--import`."""
+"""Another package's task and methods behave like built-in ones: installed, or named by `--import`."""
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import shutil
@@ -13,11 +14,30 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.method import Problem
+from codesign_bench.seeding import Streams
+
 EXAMPLE = Path(__file__).parent / "third_party"
-IMPORTS = ("--import", "reach_example.reach", "--import", "reach_example.random_search")
-SIZE = ("--seeds", "1", "--steps", "100000", "--set", "evaluations=3", "--jobs", "1")
-TRAIN = ("run", "--task", "reach", "--method", "random_search", *SIZE)
-CELL = Path("reach/random_search/default/seed-00")
+IMPORTS = tuple(f"--import=reach_example.{name}" for name in ("reach", "random_search", "sac"))
+SMALL_SAC = ("batch_size=250", "minibatch_size=32", "updates_per_step=0.05", "replay_size=2000")
+"""Batches are short, and the replay buffer overflows."""
+TRAIN = {
+    "random_search": ("--steps", "100000", "--set", "evaluations=3"),
+    "sac": ("--steps", "5000", "--set", "evaluations=3", *SMALL_SAC),
+}
+METHODS = tuple(TRAIN)
+
+
+def train(method: str, out: Path) -> tuple[str, ...]:
+    """Return the command that trains a method of the example on its task."""
+    start = ("run", "--task", "reach", "--method", method, "--seeds", "1", "--jobs", "1", "--out", str(out))
+    return (*start, *TRAIN[method])
+
+
+def cell(out: Path, method: str) -> Path:
+    """Return the folder of the method's only cell."""
+    return out / "reach" / method / "default" / "seed-00"
 
 
 def process(*arguments: str, path: Path) -> subprocess.Popen[str]:
@@ -35,14 +55,21 @@ def command(*arguments: str, path: Path, status: int = 0) -> tuple[str, str]:
     return output, errors
 
 
-def curve(out: Path) -> pd.DataFrame:
-    """Return the learning curve without the time it took."""
-    return pd.read_csv(out / CELL / "curve.csv").drop(columns="wall_s")
+def curve(folder: Path) -> pd.DataFrame:
+    """Return the learning curve of the cell in `folder` without the time it took."""
+    return pd.read_csv(folder / "curve.csv").drop(columns="wall_s")
 
 
-def cell_status(out: Path) -> str:
-    """Return the status that the cell's file tells."""
-    return str(json.loads((out / CELL / "cell.json").read_text())["status"])
+def cell_status(folder: Path) -> str:
+    """Return the status that the cell's file gives."""
+    return str(json.loads((folder / "cell.json").read_text())["status"])
+
+
+def assert_same_results(first: Path, second: Path) -> None:
+    """Assert that two cells learned the same, to the last bit."""
+    pd.testing.assert_frame_equal(curve(first), curve(second), check_exact=True)
+    for name in ("metrics.csv", "evaluation.csv", "policy.safetensors"):
+        assert (first / name).read_bytes() == (second / name).read_bytes(), name
 
 
 @pytest.fixture(scope="module")
@@ -59,14 +86,15 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def results(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a results folder with one cell that the installed example trained without a disturbance."""
+    """Return a results folder with a cell of each method that the installed example trained undisturbed."""
     out = tmp_path_factory.mktemp("results") / "runs"
-    command(*TRAIN, "--out", str(out), path=installed)
+    for method in METHODS:
+        command(*train(method, out), path=installed)
     return out
 
 
 def test_the_example_is_unknown_until_it_is_installed(tmp_path: Path) -> None:
-    _, errors = command(*TRAIN, "--out", str(tmp_path), path=tmp_path, status=2)
+    _, errors = command(*train("random_search", tmp_path), path=tmp_path, status=2)
     assert "random_search" in errors or "reach" in errors
     assert len(errors.splitlines()) <= 2
 
@@ -74,14 +102,15 @@ def test_the_example_is_unknown_until_it_is_installed(tmp_path: Path) -> None:
 @pytest.mark.parametrize("imports", [(), IMPORTS], ids=["installed", "imported"])
 def test_it_is_listed(imports: tuple[str, ...], installed: Path) -> None:
     listing, _ = command("list", *imports, path=EXAMPLE if imports else installed)
-    assert "reach" in listing
-    assert "random_search" in listing
+    assert all(name in listing for name in ("reach", *METHODS))
 
 
 def test_it_trains(results: Path) -> None:
-    assert cell_status(results) == "done"
-    assert curve(results)["env_steps"].iloc[-1] >= 100_000
-    assert curve(results)["return_mean"].iloc[-1] > curve(results)["return_mean"].iloc[0]
+    for method in METHODS:
+        assert cell_status(cell(results, method)) == "done"
+    found = curve(cell(results, "random_search"))
+    assert found["env_steps"].iloc[-1] >= 100_000
+    assert found["return_mean"].iloc[-1] > found["return_mean"].iloc[0]
 
 
 def test_it_plots(results: Path, installed: Path, tmp_path: Path) -> None:
@@ -92,17 +121,44 @@ def test_it_plots(results: Path, installed: Path, tmp_path: Path) -> None:
 
 
 def test_a_module_named_on_the_command_line_learns_the_same(results: Path, tmp_path: Path) -> None:
-    command(*TRAIN, *IMPORTS, "--out", str(tmp_path), path=EXAMPLE)
-    pd.testing.assert_frame_equal(curve(results), curve(tmp_path))
+    command(*train("random_search", tmp_path), *IMPORTS, path=EXAMPLE)
+    assert_same_results(cell(tmp_path, "random_search"), cell(results, "random_search"))
 
 
-def test_a_killed_cell_goes_on_where_it_stood(results: Path, installed: Path, tmp_path: Path) -> None:
-    started = process(*TRAIN, "--out", str(tmp_path), path=installed)
-    deadline = time.monotonic() + 120
-    while not (tmp_path / CELL / "checkpoint.safetensors").exists() and time.monotonic() < deadline:
+@pytest.mark.parametrize(("method", "kills"), [("random_search", 1), ("sac", 2)])
+def test_a_killed_cell_resumes_to_the_bit(
+    results: Path, installed: Path, tmp_path: Path, method: str, kills: int
+) -> None:
+    folder, before = cell(tmp_path, method), 0.0
+    for _ in range(kills):
+        started = process(*train(method, tmp_path), path=installed)
+        before = wait_for_a_later_checkpoint(folder, before)
+        started.kill()
+        started.communicate(timeout=60)
+        assert cell_status(folder) == "running", "it was not killed in time: the test shows nothing"
+    if method == "sac":
+        assert len(list(folder.glob("checkpoint.large-*.npz"))) >= 1, "the replay buffer lies beside the checkpoint"
+    command(*train(method, tmp_path), path=installed)
+    assert_same_results(folder, cell(results, method))
+    assert list(folder.glob("checkpoint*")) == []
+
+
+def wait_for_a_later_checkpoint(folder: Path, before: float) -> float:
+    """Wait until the cell in `folder` has saved a checkpoint after the time `before`; return when."""
+    path, deadline = folder / "checkpoint.safetensors", time.monotonic() + 120
+    while not path.exists() or path.stat().st_mtime <= before:
+        assert time.monotonic() < deadline, "no checkpoint was made"
         time.sleep(0.01)
-    started.kill()
-    started.communicate(timeout=60)
-    assert cell_status(tmp_path) == "running", "it was not killed in time: the test shows nothing"
-    command(*TRAIN, "--out", str(tmp_path), path=installed)
-    pd.testing.assert_frame_equal(curve(results), curve(tmp_path))
+    return path.stat().st_mtime
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_an_off_policy_learner_learns_to_reach(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(EXAMPLE))
+    sac, reach = (importlib.import_module(f"reach_example.{name}") for name in ("sac", "reach"))
+    method, left = sac.Sac(Problem(reach.Reach()), sac.Config(), Streams(seed)), 12_000
+    start = evaluate(method.problem.task, method.policy()).summary["success_rate"]
+    while left > 0:
+        left -= method.train(left).env_steps
+    assert start < 0.2 < 0.8 <= evaluate(method.problem.task, method.policy()).summary["success_rate"]

@@ -146,16 +146,16 @@ class ToySearch(Method[Config]):
 
     def _rollout(self, policy: Policy) -> tuple[float, int]:
         count = self.config.episodes
-        episodes, slots = self.problem.make_episodes(count), np.arange(count)
-        episodes.begin(slots, self.problem.sample_instances(self.streams["instances"], count))
-        episodes.design(slots, np.asarray(policy.design(episodes.observation), dtype=np.float64))
-        earned, env_steps = 0.0, count
-        while slots.size:
-            controls = np.asarray(policy.act(episodes.observation[slots]), dtype=np.float64)
-            reward, terminated, truncated = episodes.control(slots, controls)
-            earned += float(reward.sum())
-            env_steps += slots.size
-            slots = slots[~(terminated | truncated)]
+        slots, earned, env_steps = np.arange(count), 0.0, count
+        with self.problem.episodes(count) as episodes:
+            episodes.begin(slots, self.problem.sample_instances(self.streams["instances"], count))
+            episodes.design(slots, np.asarray(policy.design(episodes.observation[slots]), dtype=np.float64))
+            while slots.size:
+                controls = np.asarray(policy.act(episodes.observation[slots]), dtype=np.float64)
+                reward, terminated, truncated = episodes.control(slots, controls)
+                earned += float(reward.sum())
+                env_steps += slots.size
+                slots = slots[~(terminated | truncated)]
         return earned / count, env_steps
 
     def policy(self) -> Policy:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 
 def check_range(config: Any, low: float, high: float, *names: str) -> None:
@@ -28,3 +28,15 @@ def check_given(config: Any, *names: str) -> None:
     for name in names:
         if not getattr(config, name):
             raise ValueError(f"{name} must have at least one entry")
+
+
+def check_choices(config: Any) -> None:
+    """Check that the fields of a configuration that are literals hold one of their choices.
+
+    Raises:
+        ValueError: naming the first that does not, and its choices.
+    """
+    for name, hint in get_type_hints(type(config)).items():
+        if get_origin(hint) is Literal and getattr(config, name) not in get_args(hint):
+            choices = ", ".join(f"'{choice}'" for choice in get_args(hint))
+            raise ValueError(f"{name} must be one of {choices}, not '{getattr(config, name)}'")

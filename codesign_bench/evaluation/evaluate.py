@@ -14,6 +14,7 @@ import numpy as np
 from codesign_bench.task import Behaviour, Booleans, Floats, Task
 from codesign_bench.task.episodes import Episodes, Tradeoff, portions
 from codesign_bench.task.play import play
+from codesign_bench.task.simulators import Simulators
 
 
 @dataclass(frozen=True)
@@ -51,20 +52,35 @@ class Evaluation:
 
 
 def evaluate(
-    task: Task, policy: Behaviour, tradeoff: Tradeoff | None = None, instances: Floats | None = None
+    task: Task,
+    policy: Behaviour,
+    tradeoff: Tradeoff | None = None,
+    instances: Floats | None = None,
+    simulators: Simulators | None = None,
 ) -> Evaluation:
-    """Run one episode of `policy` on each of `instances` (N, I), by default the task's fixed ones."""
+    """Run one episode of `policy` on each of `instances`.
+
+    Args:
+        task: what is played.
+        policy: designs and acts.
+        tradeoff: added to the task's reward, if given.
+        instances: (N, I) in the instance space's units; None: the task's fixed ones.
+        simulators: lends the simulator; None: one is made for this evaluation.
+    """
     instances = task.evaluation_instances() if instances is None else instances
-    parts = [_play(task, policy, tradeoff, instances[part]) for part in portions(len(instances), task)]
+    lender = Simulators(task) if simulators is None else simulators
+    parts = []
+    for part in portions(len(instances), task):
+        with lender.lend(len(part)) as simulator:
+            parts.append(_play(Episodes(task, len(part), tradeoff, simulator), policy, instances[part]))
     return Evaluation(
         **{field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Evaluation)}
     )
 
 
-def _play(task: Task, policy: Behaviour, tradeoff: Tradeoff | None, instances: Floats) -> Evaluation:
-    """Run one episode on each of `instances` (N, I) in one simulator."""
-    count = len(instances)
-    episodes = Episodes(task, count, tradeoff)
+def _play(episodes: Episodes, policy: Behaviour, instances: Floats) -> Evaluation:
+    """Run one episode on each of `instances` (N, I) in the first slots of `episodes`."""
+    task, count = episodes.task, len(instances)
     returns, lengths, effort = np.zeros(count), np.zeros(count), np.zeros(count)
     for turn in play(episodes, policy, instances):
         if turn.step:
@@ -73,12 +89,12 @@ def _play(task: Task, policy: Behaviour, tradeoff: Tradeoff | None, instances: F
             effort[turn.slots] += task.effort(turn.controls)
     return Evaluation(
         instances=instances,
-        designs=episodes.designs,
+        designs=episodes.designs[:count],
         returns=returns,
         successes=episodes.success(np.arange(count)).copy(),
         lengths=lengths,
-        outcomes=episodes.simulator.outcome.copy(),
-        material=task.material(episodes.designs),
+        outcomes=episodes.simulator.outcome[:count].copy(),
+        material=task.material(episodes.designs[:count]),
         effort=effort / np.maximum(lengths, 1.0),
     )
 

@@ -1,20 +1,27 @@
-"""The actor of a two-phase learner: a Gaussian over designs and one over controls.
+"""The actor of a two-phase PPO learner: a Gaussian over designs and one over controls.
 
-Shapes: `B` batch, `O` observation, `D` design, `C` control.
+Shapes: `b` slots that take a step at once, `B` batch, `O` observation, `A` action, `D` design, `C` control.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from codesign_bench.method import Policy
-from codesign_bench.task import Singles
+from codesign_bench.learning.explorer import Explorer, Sample
+from codesign_bench.learning.network_policy import NetworkPolicy
+from codesign_bench.task import Singles, Slots
+
+Distribution = Callable[[Tensor], tuple[Tensor, Tensor]]
+"""Maps observations (B, O) to mean (B, A) and log standard deviation (A,) of actions."""
+
+LOG_PROB = "log_prob"
+"""The extra (b,) of a `GaussianExplorer`: log-probabilities of its actions."""
+LOG_SQRT_TWO_PI = 0.5 * float(np.log(2.0 * np.pi))
 
 
 class Actor(nn.Module):
@@ -49,41 +56,36 @@ class Actor(nn.Module):
         """Take a batch's observations (B, O) into the running normalisation; `is_design` (B,) marks design steps."""
 
 
-class ActorPolicy(Policy):
-    """An actor that acts with its means, clipped to [-1, 1]."""
+class GaussianExplorer(Explorer):
+    """Samples an actor's Gaussians; reports the log-probability of every action."""
 
     def __init__(self, actor: Actor) -> None:
+        super().__init__(actor.design_log_std.numel(), actor.control_log_std.numel())
         self.actor = actor
 
-    def design(self, observation: Singles) -> Singles:
-        """Return the mean design."""
-        return self._mean(self.actor.design, observation)
+    def sample_design(self, slots: Slots, observation: Singles, noise: Singles) -> Sample:
+        """Return designs drawn with `noise` (b, D)."""
+        return _sample(self.actor.design, observation, noise)
 
-    def act(self, observation: Singles) -> Singles:
-        """Return the mean control."""
-        return self._mean(self.actor.control, observation)
-
-    def tensors(self) -> dict[str, Any]:
-        """Return the actor's parameters and normalisers."""
-        return module_arrays(self.actor)
-
-    @staticmethod
-    def _mean(distribution: Any, observation: Singles) -> Singles:
-        batch = np.atleast_2d(np.asarray(observation, dtype=np.float32))
-        with torch.inference_mode():
-            mean: Singles = distribution(torch.from_numpy(batch))[0].clamp(-1.0, 1.0).numpy()
-        return mean if np.ndim(observation) == 2 else mean[0]
+    def sample_control(self, slots: Slots, observation: Singles, noise: Singles) -> Sample:
+        """Return controls drawn with `noise` (b, C)."""
+        return _sample(self.actor.control, observation, noise)
 
 
-def module_arrays(module: nn.Module) -> dict[str, Any]:
-    """Return copies of a module's parameters and buffers as arrays by name."""
-    return {name: tensor.detach().numpy().copy() for name, tensor in module.state_dict().items()}
+class ActorPolicy(NetworkPolicy):
+    """An actor that acts with its means."""
+
+    def __init__(self, actor: Actor) -> None:
+        super().__init__(actor, lambda seen: actor.design(seen)[0], lambda seen: actor.control(seen)[0])
 
 
-def load_module_arrays(module: nn.Module, arrays: Mapping[str, Any]) -> None:
-    """Put arrays from `module_arrays` back.
+def gaussian_log_prob(noise: Singles, log_std: Singles) -> Singles:
+    """Return the (b,) log-probability of mean + exp(log_std) noise for standard-normal `noise` (b, A)."""
+    result: Singles = -0.5 * (noise**2).sum(axis=-1) - (log_std + LOG_SQRT_TWO_PI).sum()
+    return result
 
-    Raises:
-        RuntimeError: names or shapes differ from the module's.
-    """
-    module.load_state_dict({name: torch.from_numpy(np.array(array)) for name, array in arrays.items()})
+
+def _sample(distribution: Distribution, observation: Singles, noise: Singles) -> Sample:
+    with torch.inference_mode():
+        mean, log_std = (values.numpy() for values in distribution(torch.from_numpy(observation)))
+    return Sample(mean + np.exp(log_std) * noise, {LOG_PROB: gaussian_log_prob(noise, log_std)})

@@ -31,6 +31,9 @@ def generalized_advantages(
         gamma: discount of a step.
         gae_lambda: weight of longer estimates.
     """
+    # The sum over k of (gamma lambda)^k error[t + k], taken backwards so that each step uses the sum behind it. Only
+    # `terminated` ends bootstrapping, but every episode's end ends the sum: an episode that was cut off has a future,
+    # which is not the next episode.
     error = reward + gamma * next_value * ~terminated - value
     advantage = np.zeros_like(error)
     following = np.zeros(error.shape[0])

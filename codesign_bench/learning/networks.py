@@ -194,12 +194,17 @@ class GraphNetwork(nn.Module):
         for all of them, and their own features by one product of the two layers' weights.
         """
         layer: GraphConvolution = self.layers[0]  # type: ignore[assignment]  # ModuleList forgets the class.
+        # Node i enters the convolution as h + g_i: h is the linear layer's output for what all nodes share, g_i the one
+        # for its own features. With d_i neighbours it leaves as
+        #     h W_own + d_i h W_neighbours + b  +  g_i W_own + (sum over neighbours j of g_j) W_neighbours,
+        # where h W_own and h W_neighbours are the same for all nodes: two products instead of two for each node.
         hidden = self.shared(shared)
         once = nn.functional.linear(hidden, layer.own.weight, layer.neighbours.bias)
         per_neighbour = nn.functional.linear(hidden, layer.neighbours.weight)
         x = torch.addcmul(once, layer.adjacency.sum(1)[:, None, None], per_neighbour)
         if self.own is None or own is None:
             return x
+        # g_i is linear in the few features of the node itself: its two layers are multiplied first, once for all rows.
         own = own[self.inputs] if len(self.inputs) < self.num_nodes else own
         weight = torch.cat([layer.own.weight @ self.own.weight, layer.neighbours.weight @ self.own.weight], dim=1)
         features = torch.cat(layer.gather(own), dim=-1).flatten(0, 1)

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from codesign_bench.learning.ppo_config import PPOConfig
 from codesign_bench.task import Slots
 
 LogProbs = Callable[[Slots], tuple[Tensor, Tensor]]
@@ -30,15 +31,22 @@ class PolicyLoss:
     """The policy's update ends when a minibatch's estimated KL divergence from the old policy exceeds this."""
     max_gradient_norm: float
 
+    @classmethod
+    def of(cls, config: PPOConfig, kl_threshold: float) -> PolicyLoss:
+        """Return the loss that `config` describes, with this limit of the divergence."""
+        return cls(config.clip_ratio, config.entropy_weight, kl_threshold, config.max_gradient_norm)
+
     def __call__(
         self, log_prob: Tensor, old_log_prob: Tensor, advantage: Tensor, entropy: Tensor
     ) -> tuple[Tensor, float]:
         """Return loss () and the estimated KL divergence (Schulman's k3 estimator) for (m,) inputs."""
         log_ratio = log_prob - old_log_prob
         ratio = log_ratio.exp()
+        # The smaller of the two takes away what could be gained beyond the range, but keeps what is lost there: a step
+        # that went too far in the wrong direction is still corrected.
         clipped = ratio.clamp(1.0 - self.clip_ratio, 1.0 + self.clip_ratio)
         surrogate = torch.minimum(ratio * advantage, clipped * advantage).mean()
-        with torch.no_grad():
+        with torch.no_grad():  # Unbiased like -log_ratio, but never negative, which makes it steadier on few rows.
             divergence = float((ratio - 1.0 - log_ratio).mean())
         return -surrogate - self.entropy_weight * entropy, divergence
 
@@ -75,6 +83,8 @@ class PolicyUpdate:
         index = torch.from_numpy(rows).to(self.advantage.device)
         log_prob, entropy = self.log_probs(rows)
         loss, self.divergence = self.loss(log_prob, self.old_log_prob[index], self.advantage[index], entropy)
+        # Checked before the step, so the one that would go further is not taken. Advantages belong to the policy that
+        # collected the batch and say little of one so far from it, so the rest of the batch is not used either.
         if self.divergence > self.loss.kl_threshold:
             self.stopped = True
             return

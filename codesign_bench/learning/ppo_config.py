@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import inf
+from typing import Literal, TypeAlias
 
-from codesign_bench.config.validation import check_given, check_range
+from codesign_bench.config.validation import check_choices, check_given, check_range
+
+Credit: TypeAlias = Literal["joint", "separate"]
+Precision: TypeAlias = Literal["fp32", "bf16"]
 
 TRANSFORM2ACT = {"source": "Transform2Act's default; the paper is silent"}
 OURS = {"source": "ours"}
@@ -51,7 +55,7 @@ class PPOConfig:
     """Whether state and goal are normalised by their running mean and deviation; False: by their bounds."""
     normalize_returns: bool = field(default=True, metadata=OURS)
     """Whether the value network learns returns normalised by their running mean and deviation."""
-    design_credit: str = "separate"
+    design_credit: Credit = "separate"
     """`joint` (the paper's) or `separate` (ours)."""
     design_learning_rate: float = 7e-4
     """Adam's step size for the designer under separate credit."""
@@ -61,16 +65,13 @@ class PPOConfig:
     """Design steps of a minibatch under separate credit."""
     design_kl_threshold: float = field(default=0.05, metadata=OURS)
     """The design update's own KL stop under separate credit."""
-    precision: str = field(default="fp32", metadata=OURS)
+    precision: Precision = field(default="fp32", metadata=OURS)
     """`fp32`, or `bf16` for the products of an update: several times as fast on processors that compute in bfloat16."""
     num_slots: int | None = field(default=None, metadata=OURS)
     """Episodes rolled out at once; None: as many as fill a batch with one full-length episode each."""
 
     def __post_init__(self) -> None:
-        if self.design_credit not in ("joint", "separate"):
-            raise ValueError(f"design_credit is 'joint' or 'separate', not '{self.design_credit}'")
-        if self.precision not in ("fp32", "bf16"):
-            raise ValueError(f"precision is 'fp32' or 'bf16', not '{self.precision}'")
+        check_choices(self)
         check_range(self, 1, inf, "batch_size", "minibatch_size", "epochs", "num_slots")
         check_range(self, 1, inf, "design_epochs", "design_minibatch_size")
         check_range(self, 0, inf, "policy_learning_rate", "value_learning_rate", "design_learning_rate")

@@ -8,7 +8,8 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from codesign_bench.learning.actor import Actor, ActorPolicy, load_module_arrays
+from codesign_bench.learning.actor import Actor, ActorPolicy
+from codesign_bench.learning.checkpointing import load_module_arrays
 from codesign_bench.learning.ppo_config import PPOConfig
 from codesign_bench.learning.two_phase import TwoPhaseLearner
 from codesign_bench.learning.value_networks import ValueNetwork

@@ -1,6 +1,6 @@
-"""Play the groups of a batch in processes of their own; the numbers are those of playing them one after the other.
+"""Play the groups of a batch in separate processes; the numbers are those of playing them one after the other.
 
-Shapes: `S` slots of a group, `D` design.
+Shapes: `S` slots of a group.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from codesign_bench.learning.actor import Actor
-from codesign_bench.learning.rollout import Collector, Trajectories
+from codesign_bench.learning.explorer import Explorer
+from codesign_bench.learning.rollout import Collector
+from codesign_bench.learning.trajectories import Trajectories
 from codesign_bench.method import Problem
 from codesign_bench.processes import end_with
-from codesign_bench.task import Singles
 
 _collector: Collector | None = None
 """The collector of a worker process."""
@@ -27,22 +27,23 @@ _collector: Collector | None = None
 
 @dataclass(frozen=True)
 class Group:
-    """What one group of slots shall play."""
+    """What one group of slots plays."""
 
     steps: int
     """Environment steps of all its slots together."""
     slots: int
+    """S"""
     rng: np.random.Generator
-    given_designs: Singles | None = None
-    """(S, D) designs to use instead of the actor's."""
+    first_slot: int = 0
+    """The number of its first slot in the batch."""
 
-    def collect(self, collector: Collector, actor: Actor) -> Trajectories:
+    def collect(self, collector: Collector, explorer: Explorer) -> Trajectories:
         """Play the group with `collector`; its generator moves on."""
-        return collector.collect(actor, self.steps, self.slots, self.rng, self.given_designs)
+        return collector.collect(explorer, self.steps, self.slots, self.rng, self.first_slot)
 
 
 class RolloutPool:
-    """Worker processes with simulators of their own, started when first needed; they end with this process."""
+    """Worker processes, each with its own simulator, started when first needed; they end with this process."""
 
     def __init__(self, problem: Problem, workers: int) -> None:
         self._pool = ProcessPoolExecutor(
@@ -52,9 +53,9 @@ class RolloutPool:
             initargs=(problem, os.getpid()),
         )
 
-    def collect(self, actor: Actor, groups: Sequence[Group]) -> list[Trajectories]:
+    def collect(self, explorer: Explorer, groups: Sequence[Group]) -> list[Trajectories]:
         """Play `groups`; their generators move on as if they had been played here."""
-        results = list(self._pool.map(_play, [actor] * len(groups), groups))
+        results = list(self._pool.map(_play, [explorer] * len(groups), groups))
         for group, (_, rng) in zip(groups, results, strict=True):
             group.rng.bit_generator.state = rng.bit_generator.state
         return [batch for batch, _ in results]
@@ -68,6 +69,6 @@ def _prepare(problem: Problem, parent: int) -> None:
     _collector = Collector(problem)
 
 
-def _play(actor: Actor, group: Group) -> tuple[Trajectories, np.random.Generator]:
+def _play(explorer: Explorer, group: Group) -> tuple[Trajectories, np.random.Generator]:
     assert _collector is not None, "a worker is prepared before it plays"
-    return group.collect(_collector, actor), group.rng
+    return group.collect(_collector, explorer), group.rng

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Generic, TypeVar
 
 from numpy.typing import NDArray
@@ -32,10 +32,18 @@ class Policy(Behaviour):
 
 @dataclass
 class State:
-    """All that a method needs to go on exactly where it stood: arrays by name, and JSON values."""
+    """All that a method needs to resume exactly where it stopped."""
 
     arrays: dict[str, Array]
+    """Networks, optimizers and the like, by name."""
     values: dict[str, Any]
+    """JSON values by name."""
+    large: dict[str, Array] = field(default_factory=dict)
+    """Arrays that take long to write, such as a replay buffer, by name.
+
+    The runner streams them to a file of their own, and saves less often the longer that takes. They need not be copies:
+    they are written before training continues, and `Method.load_state` may keep those that it is given.
+    """
 
 
 @dataclass(frozen=True)
@@ -97,7 +105,10 @@ class Method(ABC, Generic[ConfigType]):
 
     @abstractmethod
     def train(self, remaining_steps: int) -> BatchReport:
-        """Collect one batch and learn from it.
+        """Collect one batch of whole episodes and learn from it.
+
+        No episode is in progress when this returns: a checkpoint holds no simulator. That goes for off-policy methods,
+        too: they may update as often as they like within a batch, but they collect whole episodes.
 
         Args:
             remaining_steps: environment steps left in the budget; the batch is about min(batch size, remaining steps)
@@ -115,8 +126,8 @@ class Method(ABC, Generic[ConfigType]):
 
     @abstractmethod
     def state(self) -> State:
-        """Return what `load_state` needs to go on bit for bit; the runner saves the random streams."""
+        """Return what `load_state` needs to resume bit for bit; the runner saves the random streams."""
 
     @abstractmethod
     def load_state(self, state: State) -> None:
-        """Go on from `state`; called on a freshly built method with the same problem, config and seed."""
+        """Resume from `state`; called on a freshly built method with the same problem, config and seed."""

@@ -5,12 +5,16 @@ Shapes: `N` evaluation instances, `I` instance.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from codesign_bench.task import Floats, Task
 from codesign_bench.task.episodes import Episodes, Tradeoff
+from codesign_bench.task.simulators import Simulators
 
 
 @dataclass(frozen=True)
@@ -24,9 +28,16 @@ class Problem:
     instances: Floats | None = None
     """(k, I) the only instances to train and be judged on, or None: the task's own."""
 
-    def make_episodes(self, num_slots: int) -> Episodes:
-        """Return a batch of `num_slots` episodes of the task."""
-        return Episodes(self.task, num_slots, self.tradeoff)
+    @cached_property
+    def simulators(self) -> Simulators:
+        """The task's simulators in this process, which training and evaluation share."""
+        return Simulators(self.task)
+
+    @contextmanager
+    def episodes(self, num_slots: int) -> Iterator[Episodes]:
+        """Lend episodes of the task with at least `num_slots` slots, for the time of the `with` block."""
+        with self.simulators.lend(num_slots) as simulator:
+            yield Episodes(self.task, num_slots, self.tradeoff, simulator)
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
         """Return (count, I) training instances: none from the cutout region."""

@@ -1,13 +1,24 @@
-"""All that an interrupted cell needs to go on bit for bit, in one file without pickle."""
+"""All that an interrupted cell needs to resume bit for bit, without pickle.
+
+A checkpoint is one file, `checkpoint.safetensors`, or two: what a method calls large goes to a `.npz` file beside it,
+`checkpoint.large-<generation>.npz`, array by array and in pieces, so that nothing holds a second copy of it.
+
+The pair is consistent whenever a process is killed. The large file is written first, under a name that no file has
+yet; then the small file, which names it and its checksums, is replaced in one step; then older large files are
+removed. So the small file on disk always names a complete large file of the same moment. Between two saves neither
+file changes: a small file that moved on alone would belong to another moment than its large one.
+"""
 
 from __future__ import annotations
 
 import json
+import os
+import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 from safetensors import SafetensorError
@@ -15,10 +26,14 @@ from safetensors.numpy import load, save
 
 from codesign_bench.errors import UserError
 from codesign_bench.method import Array, State
-from codesign_bench.storage.files import dump_json, write_bytes
+from codesign_bench.storage.files import dump_json, replacing, write_bytes
 
 HEADER = "codesign_bench"
 """The key of the JSON header in the file's metadata."""
+PIECE = 2**20
+"""Bytes that are read at once where a file is only checked."""
+DAMAGED_ZIP = (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError, zlib.error)
+"""What reading a damaged `.npz` file raises."""
 
 
 @dataclass
@@ -51,7 +66,7 @@ class Checkpoint:
 def save_arrays(path: Path, arrays: Mapping[str, Array], header: Mapping[str, Any]) -> None:
     """Replace `path` by `arrays` and a JSON `header`, guarded by a checksum."""
     ordered = {name: np.asarray(array, order="C") for name, array in arrays.items()}
-    text = dump_json({**header, "checksum": _checksum(ordered)})
+    text = dump_json({**header, "checksum": _checksum((name, [ordered[name].tobytes()]) for name in sorted(ordered))})
     write_bytes(path, save(ordered, metadata={HEADER: text}))
 
 
@@ -62,26 +77,29 @@ def load_arrays(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
         FileNotFoundError: there is no such file.
         ValueError: it is damaged or something else.
     """
-    content = path.read_bytes()
+    header = _checked_header(path)
     try:
-        size = int.from_bytes(content[:8], "little")
-        header = json.loads(json.loads(content[8 : 8 + size])["__metadata__"][HEADER])
-        arrays: dict[str, Array] = load(content)
-    except (SafetensorError, ValueError, KeyError, TypeError) as error:
+        return load(path.read_bytes()), header
+    except SafetensorError as error:
         raise ValueError("damaged or not written by codesign-bench") from error
-    if header.pop("checksum") != _checksum(arrays):
-        raise ValueError("damaged: its checksum does not match")
-    return arrays, header
 
 
 def save_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
-    """Replace `path` by `checkpoint` in one step."""
+    """Replace the checkpoint in `path`, and what is large of it beside."""
+    large, checksums = None, None
+    if checkpoint.state.large:
+        large = path.with_name(f"{path.stem}.large-{1 + max(map(_generation, _large_files(path)), default=0)}.npz")
+        checksums = _save_large(large, checkpoint.state.large)
     header = {
         "values": checkpoint.state.values,
         "streams": checkpoint.streams,
         "progress": vars(checkpoint.progress),
+        "large": None if large is None else {"file": large.name, "checksums": checksums},
     }
     save_arrays(path, checkpoint.state.arrays, header)
+    for other in _large_files(path):
+        if other != large:
+            other.unlink(missing_ok=True)
 
 
 def load_checkpoint(path: Path) -> Checkpoint | None:
@@ -90,17 +108,144 @@ def load_checkpoint(path: Path) -> Checkpoint | None:
     Raises:
         UserError: it is truncated or damaged.
     """
-    try:
-        arrays, header = load_arrays(path)
-        return Checkpoint(State(arrays, header["values"]), header["streams"], Progress(**header["progress"]))
-    except FileNotFoundError:
+    return _usable(path, _load_checkpoint)
+
+
+def check_checkpoint(path: Path) -> None:
+    """Check the checkpoint in `path`, if there is one, by its header and its checksums, a piece at a time.
+
+    Raises:
+        UserError: it is truncated or damaged.
+    """
+    _usable(path, _check_checkpoint)
+
+
+def remove_checkpoint(path: Path) -> None:
+    """Remove the checkpoint in `path`, and what is large of it beside."""
+    path.unlink(missing_ok=True)
+    for large in _large_files(path):
+        large.unlink(missing_ok=True)
+
+
+def _load_checkpoint(path: Path) -> Checkpoint:
+    arrays, header = load_arrays(path)
+    large = _read_large(path, header, _load_member)
+    return Checkpoint(State(arrays, header["values"], large), header["streams"], Progress(**header["progress"]))
+
+
+def _check_checkpoint(path: Path) -> None:
+    header = _checked_header(path)
+    Progress(**header["progress"])
+    _read_large(path, header, _check_member)
+
+
+def _usable(path: Path, read: Callable[[Path], Any]) -> Any:
+    """Return what `read` makes of `path`, or None when there is no such file.
+
+    Raises:
+        UserError: it is truncated or damaged.
+    """
+    if not path.exists():
         return None
+    try:
+        return read(path)
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise UserError(f"checkpoint {path} is unusable ({error}); delete it to start its cell again") from error
 
 
-def _checksum(arrays: Mapping[str, Array]) -> int:
+def _checked_header(path: Path) -> dict[str, Any]:
+    """Return the header that `save_arrays` wrote, after a look at every byte of the arrays.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: it is damaged or something else.
+    """
+    with path.open("rb") as stream:
+        try:
+            size = int.from_bytes(stream.read(8), "little")
+            if size > os.fstat(stream.fileno()).st_size:
+                raise ValueError("its header is longer than the file")
+            layout = json.loads(stream.read(size))
+            header: dict[str, Any] = json.loads(layout.pop("__metadata__")[HEADER])
+            offsets = {name: [8 + size + end for end in layout[name]["data_offsets"]] for name in sorted(layout)}
+            expected = header.pop("checksum")
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise ValueError("damaged or not written by codesign-bench") from error
+        if expected != _checksum((name, _pieces(stream, *ends)) for name, ends in offsets.items()):
+            raise ValueError("damaged: its checksum does not match")
+    return header
+
+
+def _pieces(stream: BinaryIO, start: int, end: int) -> Iterator[bytes]:
+    """Yield the bytes from `start` to `end` of a file, as far as it has them."""
+    stream.seek(start)
+    while start < end and (piece := stream.read(min(PIECE, end - start))):
+        start += len(piece)
+        yield piece
+
+
+def _checksum(contents: Iterator[tuple[str, Any]]) -> int:
+    """Return the checksum of arrays: names in alphabetical order, each with the pieces of its bytes."""
     total = 0
-    for name in sorted(arrays):
-        total = zlib.crc32(arrays[name].tobytes(), zlib.crc32(name.encode(), total))
+    for name, pieces in contents:
+        total = zlib.crc32(name.encode(), total)
+        for piece in pieces:
+            total = zlib.crc32(piece, total)
     return total
+
+
+def _large_files(path: Path) -> list[Path]:
+    """Return all large files beside the checkpoint `path`, whichever of them it names."""
+    found = path.parent.glob(f"{path.stem}.large-*.npz")
+    return [large for large in found if large.stem.rpartition("-")[2].isdigit()]
+
+
+def _generation(large: Path) -> int:
+    return int(large.stem.rpartition("-")[2])
+
+
+def _save_large(path: Path, arrays: Mapping[str, Array]) -> dict[str, int]:
+    """Replace `path` by arrays, which numpy hands on in pieces; return their checksums by name."""
+    with replacing(path) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, np.asarray(array), allow_pickle=False)
+        return _checksums(archive)
+
+
+def _checksums(archive: zipfile.ZipFile) -> dict[str, int]:
+    return {info.filename.removesuffix(".npy"): info.CRC for info in archive.infolist()}
+
+
+def _read_large(path: Path, header: Mapping[str, Any], read: Callable[[BinaryIO], Any]) -> dict[str, Any]:
+    """Return name -> what `read` makes of each large array of the checkpoint in `path`, which has this header.
+
+    Raises:
+        OSError: there is no such file.
+        ValueError: it is damaged, or another one than the header names.
+    """
+    if header.get("large") is None:
+        return {}
+    large, found = path.with_name(header["large"]["file"]), {}
+    try:
+        with zipfile.ZipFile(large) as archive:
+            if _checksums(archive) != header["large"]["checksums"]:
+                raise ValueError("it is another one than the checkpoint names")
+            for info in archive.infolist():
+                with archive.open(info) as member:  # Compares the checksum once the last byte is read.
+                    found[info.filename.removesuffix(".npy")] = read(cast(BinaryIO, member))
+    except DAMAGED_ZIP as error:
+        raise ValueError(f"{large.name} is damaged: {error}") from error
+    return found
+
+
+def _load_member(member: BinaryIO) -> Array:
+    array: Array = np.lib.format.read_array(member, allow_pickle=False)
+    if member.read(1):
+        raise ValueError("longer than its array")
+    return array
+
+
+def _check_member(member: BinaryIO) -> None:
+    while member.read(PIECE):
+        pass

@@ -21,6 +21,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.machine import host_facts, package_versions
 from codesign_bench.plugins import import_modules
 from codesign_bench.processes import EXIT_ORPHANED
+from codesign_bench.storage.checkpoint import remove_checkpoint
 from codesign_bench.storage.files import remove_partial_files
 from codesign_bench.storage.layout import CHECKPOINT_FILE, LOCK_FILE, LOG_FILE, PROGRESS_FILE, cell_lock
 from codesign_bench.storage.records import DONE, FAILED, CellRecord, Failure, Timings, now
@@ -105,7 +106,8 @@ def _run_and_record(resolved: ResolvedCell, folder: Path, record: CellRecord) ->
         record.ended(FAILED, failure=Failure(message, traceback.format_exc()), **reached).write(folder)
         return EXIT_FAILED
     record.ended(DONE, env_steps=run.progress.env_steps, timings=run.timings()).write(folder)
-    for name in (CHECKPOINT_FILE, PROGRESS_FILE, LOG_FILE, LOCK_FILE):
+    remove_checkpoint(folder / CHECKPOINT_FILE)
+    for name in (PROGRESS_FILE, LOG_FILE, LOCK_FILE):
         (folder / name).unlink(missing_ok=True)
     return EXIT_DONE
 

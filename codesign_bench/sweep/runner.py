@@ -17,7 +17,7 @@ from codesign_bench.console import Log, printer
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores
 from codesign_bench.registry import IMPORTS_VARIABLE
-from codesign_bench.storage.checkpoint import load_checkpoint
+from codesign_bench.storage.checkpoint import check_checkpoint
 from codesign_bench.storage.layout import CHECKPOINT_FILE, CURVE_FILE, is_locked, open_folder
 from codesign_bench.storage.records import DONE, FAILED, CellRecord
 from codesign_bench.sweep.backends import Backend, WorkersDied, make_backend
@@ -58,7 +58,7 @@ def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = 
         elif record is not None and record.failure is not None and not retry_failed:
             plan.failed[cell] = record.failure.message
         else:
-            load_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is refused here, not in the middle
+            check_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is refused here, not in the middle
             plan.pending.append(resolved)
     return plan
 

@@ -32,6 +32,9 @@ from codesign_bench.storage.records import Timings
 CHECKPOINT_SECONDS_VARIABLE = "CODESIGN_BENCH_CHECKPOINT_SECONDS"
 """Environment variable: seconds between checkpoints (0 is after every batch); evaluations always make one."""
 CHECKPOINT_SECONDS = 20.0
+PAUSE_PER_SAVE = 20.0
+"""A checkpoint that took long to write is followed by a pause this many times as long: saving takes a twentieth of the
+time at most, evaluations aside, whatever the size of the method's state."""
 PROGRESS_SECONDS = 1.0
 
 
@@ -55,6 +58,7 @@ class CellRun:
             self.method.start_from(policy_tensors(open_cell(before.folder(_results(cell, folder)))))
         self._interval = float(os.environ.get(CHECKPOINT_SECONDS_VARIABLE, CHECKPOINT_SECONDS))
         self._started = self._saved = time.monotonic()
+        self._save_s = 0.0
         self._reported = float("-inf")
         self._earlier_wall_s = self.progress.wall_s
         self._earlier_steps = self.progress.env_steps
@@ -70,7 +74,7 @@ class CellRun:
             self._train(steps - self.progress.env_steps)
             if self.progress.env_steps >= self._mark(self.progress.next_mark):
                 self._evaluate()
-            elif time.monotonic() - self._saved >= self._interval:
+            elif time.monotonic() - self._saved >= self._pause():
                 self._save()
             self._report("training")
         self._write_final()
@@ -123,18 +127,25 @@ class CellRun:
         self._write_curve()
 
     def _judge(self) -> Evaluation:
-        problem = self.problem
-        return evaluate(problem.task, self.method.policy(), problem.tradeoff, problem.evaluation_instances())
+        problem, policy = self.problem, self.method.policy()
+        instances = problem.evaluation_instances()
+        return evaluate(problem.task, policy, problem.tradeoff, instances, problem.simulators)
 
     def _mark(self, index: int) -> int:
         """Return the environment steps at which evaluation `index` is due; 0 and the whole budget are marks."""
         return round(index * self.config.run.steps / self.config.run.evaluations)
 
     def _save(self) -> None:
+        start = time.monotonic()
         self.progress.wall_s = self._wall_s()
         checkpoint = Checkpoint(self.method.state(), self.streams.state(), self.progress)
         save_checkpoint(self.folder / CHECKPOINT_FILE, checkpoint)
         self._saved = time.monotonic()
+        self._save_s = self._saved - start
+
+    def _pause(self) -> float:
+        """Return how long to train between two checkpoints, s."""
+        return max(self._interval, PAUSE_PER_SAVE * self._save_s) if self._interval else 0.0
 
     def _wall_s(self) -> float:
         return self._earlier_wall_s + time.monotonic() - self._started

@@ -35,7 +35,7 @@ def portions(count: int, task: Task) -> list[Slots]:
 
 
 class Episodes:
-    """Runs `num_slots` independent two-phase episodes and keeps their observations (B, O) in one array.
+    """Runs independent two-phase episodes, one per slot, and keeps their observations (B, O) in one array.
 
     An episode in a slot goes `begin`, `design`, then `control` until it is terminated or truncated. The design step
     counts as an environment step and has reward 0.
@@ -46,9 +46,10 @@ class Episodes:
     ) -> None:
         self.task = task
         self.tradeoff = tradeoff
-        self.num_slots = num_slots
         self.layout = task.layout
         self.simulator = task.make_simulator(num_slots) if simulator is None else simulator
+        self.num_slots = num_slots = self.simulator.num_slots
+        """B: as many as asked for, or more where a wider simulator was handed in."""
         self.observation: Singles = np.zeros((num_slots, self.layout.size), dtype=np.float32)
         self.elapsed = np.zeros(num_slots, dtype=np.intp)
         """(B,) control steps since the design step."""

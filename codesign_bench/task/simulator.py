@@ -52,7 +52,8 @@ class Simulator(ABC):
     """Many independent episodes of one task in one process; slot `i` holds one episode.
 
     A call names the slots it means and touches no other. What happens in a slot depends on what was sent to that
-    slot since its `begin` alone, so an episode is the same alone and in any batch.
+    slot since its `begin` alone, so an episode is the same alone and in any batch, in a new simulator and in one that
+    has played before: simulators are kept and used again.
     """
 
     def __init__(self, num_slots: int, state_size: int) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codesign_bench.learning import rollout
+from codesign_bench.learning import batches
 from codesign_bench.learning.two_phase import TwoPhaseLearner
 from codesign_bench.method import Problem, load_method, method_names
 from codesign_bench.seeding import Streams
@@ -25,7 +25,7 @@ GROUP_SLOTS = 4
 @pytest.fixture(autouse=True)
 def small_groups(monkeypatch: pytest.MonkeyPatch) -> None:
     """Several groups although batches are small."""
-    monkeypatch.setattr(rollout, "GROUP_SLOTS", GROUP_SLOTS)
+    monkeypatch.setattr(batches, "GROUP_SLOTS", GROUP_SLOTS)
 
 
 def trained(make_learner: MakeLearner, cores: int, **settings: Any) -> tuple[TwoPhaseLearner, list[dict[str, float]]]:
@@ -39,7 +39,7 @@ def trained(make_learner: MakeLearner, cores: int, **settings: Any) -> tuple[Two
 def test_no_number_depends_on_the_cores(make_learner: MakeLearner, credit: str, cores: int) -> None:
     one, metrics = trained(make_learner, 1, design_credit=credit)
     more, same = trained(make_learner, cores, design_credit=credit)
-    assert len(rollout.group_sizes(16, 1_000)) == 4
+    assert len(batches.group_sizes(16, 1_000)) == 4
     assert metrics == same
     for name, array in one.state().arrays.items():
         np.testing.assert_array_equal(array, more.state().arrays[name], err_msg=name)
@@ -67,7 +67,7 @@ def test_no_method_depends_on_the_cores(name: str) -> None:
 SLEEPER = """
 import multiprocessing, sys, time
 import toy
-from codesign_bench.learning import rollout
+from codesign_bench.learning.actor import GaussianExplorer
 from codesign_bench.learning.rollout_pool import Group, RolloutPool
 from codesign_bench.method import Problem, load_method
 from codesign_bench.seeding import Streams, generator
@@ -76,7 +76,7 @@ if __name__ == "__main__":
     method = load_method("shared_arch")
     problem = Problem(toy.ToyReach())
     actor = method.make_actor(problem.task, method.config_class(), generator(0, "weights"))
-    RolloutPool(problem, 2).collect(actor, [Group(24, 4, generator(0, str(i))) for i in range(2)])
+    RolloutPool(problem, 2).collect(GaussianExplorer(actor), [Group(24, 4, generator(0, str(i))) for i in range(2)])
     print(*(child.pid for child in multiprocessing.active_children()), flush=True)
     time.sleep(600)
 """

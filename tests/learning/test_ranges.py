@@ -7,8 +7,11 @@ from typing import Any
 
 import pytest
 
+from codesign_bench.config.resolve import resolve
+from codesign_bench.errors import UserError
 from codesign_bench.learning.cma_es import EvolutionConfig
 from codesign_bench.learning.ppo_config import GraphConfig, PerceptronConfig, PPOConfig
+from codesign_bench.method import load_method
 
 
 @pytest.mark.parametrize(
@@ -32,6 +35,26 @@ def test_a_value_out_of_range_is_named(config: Any, change: dict[str, Any]) -> N
     (name,) = change
     with pytest.raises(ValueError, match=name):
         replace(config, **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"design_credit": "shared"}, "design_credit must be one of 'joint', 'separate', not 'shared'"),
+        ({"precision": "half"}, "precision must be one of 'fp32', 'bf16', not 'half'"),
+    ],
+)
+def test_an_unknown_choice_is_named_with_those_there_are(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        replace(PPOConfig(), **change)
+
+
+@pytest.mark.parametrize(
+    ("override", "choices"), [("design_credit=shared", "joint, separate"), ("precision=half", "fp32, bf16")]
+)
+def test_the_command_line_names_the_choices(override: str, choices: str) -> None:
+    with pytest.raises(UserError, match=f"expected one of {choices}"):
+        resolve(load_method("gnn_ppo"), "push", "quick", [override])
 
 
 def test_values_at_the_limits_are_allowed() -> None:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from codesign_bench import plugins, registry
 from codesign_bench.method import Method, Problem, load_method
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Task, load_task
+
+EXAMPLE = Path(__file__).parent.parent / "third_party"
 
 SMALL: dict[str, Any] = {
     "batch_size": 600,
@@ -27,6 +31,8 @@ SMALL: dict[str, Any] = {
     "design_gnn": (16, 16),
     "design_index_mlp": (16,),
     "value_mlp": (16,),
+    "hidden": (16,),
+    "replay_size": 1_000,
 }
 """What is set in a configuration that has the field, for batches of a few episodes with small networks."""
 
@@ -36,6 +42,15 @@ def small_config(method_class: type[Method[Any]], **changes: Any) -> Any:
     config = method_class.config_class()
     known = {field.name for field in fields(config)}
     return replace(config, **{name: value for name, value in (SMALL | changes).items() if name in known})
+
+
+@pytest.fixture(autouse=True)
+def example(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make the example package's off-policy method known."""
+    monkeypatch.syspath_prepend(str(EXAMPLE))
+    monkeypatch.setenv(registry.IMPORTS_VARIABLE, "")
+    monkeypatch.setattr(registry, "_registered", {})
+    plugins.import_modules(["reach_example.sac"])
 
 
 @pytest.fixture(scope="session")

@@ -23,7 +23,8 @@ from codesign_bench.task import Singles, Task, task_names
 from codesign_bench.task.episodes import Episodes
 
 MakeMethod = Callable[..., Method[Any]]
-EVERY_METHOD = pytest.mark.parametrize("name", method_names())
+EVERY_METHOD = pytest.mark.parametrize("name", [*method_names(), "sac"])
+"""The built-in methods and the example package's off-policy one."""
 BUDGET = 10_000
 
 
@@ -50,9 +51,10 @@ def assert_same_state(first: Method[Any], second: Method[Any]) -> None:
     """Assert that two methods stand at the same point, to the last bit."""
     a, b = first.state(), second.state()
     assert a.values == b.values
-    assert a.arrays.keys() == b.arrays.keys()
-    for name, array in a.arrays.items():
-        np.testing.assert_array_equal(array, b.arrays[name], err_msg=name)
+    for arrays, others in ((a.arrays, b.arrays), (a.large, b.large)):
+        assert arrays.keys() == others.keys()
+        for name, array in arrays.items():
+            np.testing.assert_array_equal(array, others[name], err_msg=name)
 
 
 @EVERY_METHOD

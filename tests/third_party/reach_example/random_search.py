@@ -87,18 +87,16 @@ class RandomSearch(Method[Config]):
 
     def _roll_out(self, policy: Policy, instances: Floats) -> tuple[Floats, Floats]:
         """Run an episode of each instance (b, I); return their lengths, the design step included, and returns, (b,)."""
-        count = len(instances)
-        episodes = self.problem.make_episodes(count)
-        running = np.arange(count)
-        episodes.begin(running, instances)
-        episodes.design(running, policy.design(episodes.observation).astype(np.float64))
-        lengths, returns = np.ones(count), np.zeros(count)
-        while running.size:
-            controls = policy.act(episodes.observation[running]).astype(np.float64)
-            reward, terminated, truncated = episodes.control(running, controls)
-            returns[running] += reward
-            lengths[running] += 1
-            running = running[~(terminated | truncated)]
+        running, lengths, returns = np.arange(len(instances)), np.ones(len(instances)), np.zeros(len(instances))
+        with self.problem.episodes(len(instances)) as episodes:
+            episodes.begin(running, instances)
+            episodes.design(running, policy.design(episodes.observation[running]).astype(np.float64))
+            while running.size:
+                controls = policy.act(episodes.observation[running]).astype(np.float64)
+                reward, terminated, truncated = episodes.control(running, controls)
+                returns[running] += reward
+                lengths[running] += 1
+                running = running[~(terminated | truncated)]
         return lengths, returns
 
 

@@ -1,0 +1,73 @@
+"""Collect a batch: divide its slots into groups and play these, here or in processes side by side.
+
+Shapes: `S` slots of a batch.
+
+Each group has its own random stream and its own batched calls of the explorer. How many groups there are follows from
+the number of slots alone, so no number depends on how many processes play them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from codesign_bench.learning.explorer import Explorer
+from codesign_bench.learning.rollout import Collector
+from codesign_bench.learning.rollout_pool import Group, RolloutPool
+from codesign_bench.learning.trajectories import Trajectories, joined
+from codesign_bench.method import Problem
+from codesign_bench.seeding import Streams
+
+GROUP_SLOTS = 96
+"""A group has at least this many slots, unless the batch has fewer: smaller calls of the policy cost more per step."""
+
+
+class BatchCollector:
+    """Collects the batches of one learner; random numbers come from the streams `rollout`, `rollout 1` and so on."""
+
+    def __init__(self, problem: Problem, streams: Streams) -> None:
+        self.problem, self.streams = problem, streams
+        self._collector = Collector(problem)
+        self._pool: RolloutPool | None = None
+
+    def use_cores(self, count: int) -> None:
+        """Play groups in up to `count` processes; no number changes."""
+        self._pool = RolloutPool(self.problem, count) if count > 1 else None
+
+    def collect(self, explorer: Explorer, steps: int, num_slots: int | None = None) -> Trajectories:
+        """Return about `steps` environment steps of whole episodes.
+
+        Args:
+            explorer: chooses designs and controls.
+            steps: environment steps wanted; the last episode of every slot is finished.
+            num_slots: S, the episodes played at once; None: as many as give one full-length episode each.
+        """
+        groups = self._groups(steps, num_slots or slots_for(steps, self.problem.task.horizon + 1))
+        if self._pool is not None and len(groups) > 1:
+            return joined(self._pool.collect(explorer, groups))
+        return joined([group.collect(self._collector, explorer) for group in groups])
+
+    def _groups(self, steps: int, num_slots: int) -> list[Group]:
+        groups, first = [], 0
+        for index, size in enumerate(group_sizes(num_slots, self.problem.task.max_slots)):
+            stream = "rollout" if index == 0 else f"rollout {index}"
+            groups.append(Group(steps * size // num_slots, size, self.streams[stream], first))
+            first += size
+        return groups
+
+
+def slots_for(steps: int, episode_steps: int, most: int | None = None) -> int:
+    """Return how many slots, at most `most`, fill `steps` steps with one episode of `episode_steps` steps each."""
+    wanted = max(1, round(steps / episode_steps))
+    return wanted if most is None else min(wanted, most)
+
+
+def group_sizes(num_slots: int, max_slots: int) -> list[int]:
+    """Return the sizes of the groups that `num_slots` slots form: one, or an even number, as equal as can be.
+
+    No group has more than `max_slots`, the most that the task's simulators may have.
+    """
+    pairs = num_slots // (2 * GROUP_SLOTS)
+    if num_slots > max_slots:
+        pairs = max(pairs, -(-num_slots // (2 * max_slots)))
+    count = 2 * pairs or 1
+    return [len(part) for part in np.array_split(np.arange(num_slots), count)]

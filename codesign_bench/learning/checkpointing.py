@@ -1,0 +1,79 @@
+"""Networks and optimizers as arrays by name, and back: what checkpoints and policy files hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from codesign_bench.method import Array
+
+Modules = Mapping[str, nn.Module]
+"""Networks with their names in checkpoints."""
+
+Optimizers = Mapping[str, torch.optim.Optimizer]
+"""Optimizers with their names in checkpoints."""
+
+
+def learner_arrays(modules: Modules, optimizers: Optimizers) -> dict[str, Array]:
+    """Return copies of everything that `modules` and `optimizers` have learned, as arrays by name."""
+    arrays: dict[str, Array] = {}
+    for name, module in modules.items():
+        arrays |= _prefixed(f"{name}.", module_arrays(module))
+    for name, optimizer in optimizers.items():
+        arrays |= _prefixed(f"optimizer.{name}.", optimizer_arrays(optimizer))
+    return arrays
+
+
+def load_learner_arrays(modules: Modules, optimizers: Optimizers, arrays: Mapping[str, Array]) -> None:
+    """Restore what `learner_arrays` returned.
+
+    Raises:
+        RuntimeError: names or shapes differ from the modules'.
+    """
+    for name, module in modules.items():
+        load_module_arrays(module, _below(f"{name}.", arrays))
+    for name, optimizer in optimizers.items():
+        load_optimizer_arrays(optimizer, _below(f"optimizer.{name}.", arrays))
+
+
+def module_arrays(module: nn.Module) -> dict[str, Array]:
+    """Return copies of a module's parameters and buffers as arrays by name."""
+    return {name: tensor.detach().numpy().copy() for name, tensor in module.state_dict().items()}
+
+
+def load_module_arrays(module: nn.Module, arrays: Mapping[str, Array]) -> None:
+    """Restore what `module_arrays` returned.
+
+    Raises:
+        RuntimeError: names or shapes differ from the module's.
+    """
+    module.load_state_dict({name: torch.from_numpy(np.array(array)) for name, array in arrays.items()})
+
+
+def optimizer_arrays(optimizer: torch.optim.Optimizer) -> dict[str, Array]:
+    """Return copies of an optimizer's moments and counts by "<parameter's index>.<name>"."""
+    return {
+        f"{index}.{name}": value.numpy().copy()
+        for index, values in optimizer.state_dict()["state"].items()
+        for name, value in values.items()
+    }
+
+
+def load_optimizer_arrays(optimizer: torch.optim.Optimizer, arrays: Mapping[str, Array]) -> None:
+    """Restore what `optimizer_arrays` returned; the step size stays as it is."""
+    state: dict[int, dict[str, Tensor]] = {}
+    for key, array in arrays.items():
+        index, name = key.split(".")
+        state.setdefault(int(index), {})[name] = torch.from_numpy(np.array(array))
+    optimizer.load_state_dict({"state": state, "param_groups": optimizer.state_dict()["param_groups"]})
+
+
+def _prefixed(prefix: str, arrays: Mapping[str, Array]) -> dict[str, Array]:
+    return {f"{prefix}{name}": array for name, array in arrays.items()}
+
+
+def _below(prefix: str, arrays: Mapping[str, Array]) -> dict[str, Array]:
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}

@@ -1,0 +1,86 @@
+"""Where and how precisely updates compute.
+
+Shapes: `m` rows of a minibatch, `O` observation, `A` action.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from codesign_bench.learning.actor import Distribution
+from codesign_bench.learning.checkpointing import Modules, Optimizers
+from codesign_bench.learning.ppo_config import Precision
+
+CPU = torch.device("cpu")
+BLOCK = 64
+"""Rows of observations come in multiples of this where products are compiled for their shape (ours)."""
+
+
+class Compute:
+    """The device of a learner's updates, and the precision of their products.
+
+    Networks live on the processor, where rollouts use them, and visit the device for the time of an update.
+    """
+
+    def __init__(self, precision: Precision = "fp32", block: int = BLOCK) -> None:
+        self.precision, self.block = precision, block
+        self.device = CPU
+
+    @property
+    def reduced(self) -> bool:
+        """Whether products are computed in less than single precision."""
+        return self.precision != "fp32"
+
+    @contextmanager
+    def holding(self, modules: Modules, optimizers: Optimizers) -> Iterator[None]:
+        """Bring networks and optimizers to the device, and back to the processor at the end."""
+        if self.device == CPU:
+            yield
+            return
+        move(modules, optimizers, self.device)
+        try:
+            yield
+        finally:
+            move(modules, optimizers, CPU)
+
+    def tensor(self, array: np.ndarray) -> Tensor:
+        """Return an array as a tensor on the device."""
+        return torch.from_numpy(array).to(self.device)
+
+    def distribution(self, phase: Distribution, observation: Tensor) -> tuple[Tensor, Tensor]:
+        """Return mean (m, A) and log standard deviation (A,) of a phase's actions for observations (m, O)."""
+        with self._autocast():
+            mean, log_std = phase(observation)
+        return mean.float(), log_std
+
+    def predict(self, network: Callable[[Tensor], Tensor], observation: Tensor) -> Tensor:
+        """Return a value network's output (m,) for observations (m, O)."""
+        with self._autocast():
+            values = network(observation)
+        return values.float()
+
+    def whole_blocks(self, observation: Tensor) -> Tensor:
+        """Return observations (m, O), in reduced precision with rows of zeros up to a multiple of the block.
+
+        The share of design steps differs between minibatches, and the library behind such products compiles and keeps a
+        kernel for every number of rows: hundreds of megabytes.
+        """
+        missing = -len(observation) % self.block if self.reduced else 0
+        return nn.functional.pad(observation, (0, 0, 0, missing)) if missing else observation
+
+    def _autocast(self) -> torch.autocast:
+        return torch.autocast(self.device.type, torch.bfloat16, enabled=self.reduced)
+
+
+def move(modules: Modules, optimizers: Optimizers, device: torch.device) -> None:
+    """Move networks, and the moments and counts of their optimizers, to a device."""
+    for module in modules.values():
+        module.to(device)
+    for optimizer in optimizers.values():
+        for values in optimizer.state.values():
+            values.update({key: value.to(device) for key, value in values.items()})

@@ -1,0 +1,185 @@
+"""Who is credited with an episode's outcome: three ways to learn, or not to learn, the design step.
+
+Shapes: `n` valid steps of a batch, `d` its design steps, `m` rows of a minibatch, `O` observation, `D` design,
+`C` control.
+
+`JointCredit`, the paper's: the design step is one more step of the episode, with the discounted advantage of every
+other step, in the same minibatches. `SeparateCredit` (ours, after the temporal credit assignment of BodyGen, 2025): its
+advantage is the undiscounted return minus a second value network's, normalised apart, with its own updates and its own
+KL stop. `NoCredit`: designs are chosen by something else than the policy gradient.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from codesign_bench.learning.actor import LOG_PROB, Actor
+from codesign_bench.learning.compute import Compute
+from codesign_bench.learning.gae import episode_returns
+from codesign_bench.learning.optimizers import adam
+from codesign_bench.learning.ppo import LogProbs, PolicyLoss, PolicyUpdate, ValueUpdate, gaussian, normalized
+from codesign_bench.learning.ppo_config import PPOConfig
+from codesign_bench.learning.trajectories import Trajectories
+from codesign_bench.learning.update_loop import UpdateLoop
+from codesign_bench.learning.value_networks import DesignValue
+from codesign_bench.seeding import Streams
+from codesign_bench.task import Slots, Task
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Valid steps of a batch as tensors on the device of updates."""
+
+    observation: Tensor
+    """(n, O)"""
+    is_design: Tensor
+    """(n,)"""
+    design: Tensor
+    """(n, D)"""
+    control: Tensor
+    """(n, C)"""
+    log_prob: Tensor
+    """(n,) of the actions, under the policy that took them."""
+
+    @classmethod
+    def of(cls, batch: Trajectories, compute: Compute) -> Steps:
+        """Return all valid steps of `batch`."""
+        arrays = (batch.observation, batch.is_design, batch.design, batch.control, batch.extras[LOG_PROB])
+        return cls(*(compute.tensor(array[batch.valid]) for array in arrays))
+
+
+class DesignCredit(ABC):
+    """How the design step is learned beside the control steps."""
+
+    def __init__(self, actor: Actor, compute: Compute) -> None:
+        self.actor, self.compute = actor, compute
+        self.modules: dict[str, nn.Module] = {}
+        """Its own networks by name."""
+        self.optimizers: dict[str, torch.optim.Optimizer] = {}
+        """Its own optimizers by name."""
+
+    def policy_parameters(self) -> list[nn.Parameter]:
+        """Return what the batch's policy update trains: the controller, unless a credit says more."""
+        return self.actor.control_parameters()
+
+    def learned(self, is_design: Tensor) -> Tensor:
+        """Return which steps (n,) the batch's policy update learns from: control steps, unless a credit says more."""
+        return ~is_design
+
+    def log_probs(self, steps: Steps) -> LogProbs:
+        """Return the function from rows of `steps` to log-probabilities and mean entropy."""
+
+        def of_controls(rows: Slots) -> tuple[Tensor, Tensor]:
+            index = self.compute.tensor(rows)
+            distribution = self.compute.distribution(self.actor.control, steps.observation[index])
+            return gaussian(*distribution, steps.control[index])
+
+        return of_controls
+
+    @abstractmethod
+    def learn(self, batch: Trajectories) -> dict[str, float]:
+        """Learn from the design steps apart from the batch's policy update; return the logged values."""
+
+
+class NoCredit(DesignCredit):
+    """Designs are given: only control steps are learned."""
+
+    def learn(self, batch: Trajectories) -> dict[str, float]:
+        """Learn nothing."""
+        return {}
+
+
+class JointCredit(DesignCredit):
+    """The design step is learned like every other step."""
+
+    def policy_parameters(self) -> list[nn.Parameter]:
+        """Return the parameters of controller and designer, those that they share once."""
+        control = self.actor.control_parameters()
+        known = {id(p) for p in control}
+        return control + [p for p in self.actor.design_parameters() if id(p) not in known]
+
+    def learned(self, is_design: Tensor) -> Tensor:
+        """Return all steps (n,)."""
+        return torch.ones_like(is_design)
+
+    def log_probs(self, steps: Steps) -> LogProbs:
+        """Return the function from rows of `steps` to log-probabilities and mean entropy over both phases."""
+
+        def of_both(rows: Slots) -> tuple[Tensor, Tensor]:
+            index = self.compute.tensor(rows)
+            designing = steps.is_design[index]
+            log_prob, entropy = steps.observation.new_zeros(len(rows)), steps.observation.new_zeros(())
+            # Each network sees the rows of its own phase alone, which is less work than both networks for all rows and
+            # a choice afterwards; masked_scatter then puts the results back in the rows' order.
+            for phase, action, where in (
+                (self.actor.control, steps.control, ~designing),
+                (self.actor.design, steps.design, designing),
+            ):
+                if where.any():  # A small minibatch may hold no design step.
+                    chosen = index[where]
+                    observation = self.compute.whole_blocks(steps.observation[chosen])
+                    mean, log_std = self.compute.distribution(phase, observation)
+                    part, part_entropy = gaussian(mean[: len(chosen)], log_std, action[chosen])
+                    log_prob = log_prob.masked_scatter(where, part)
+                    entropy = entropy + where.float().mean() * part_entropy
+            return log_prob, entropy
+
+        return of_both
+
+    def learn(self, batch: Trajectories) -> dict[str, float]:
+        """Learn nothing more: the batch's policy update has learned from all steps."""
+        return {}
+
+
+class SeparateCredit(DesignCredit):
+    """Each design is credited with its episode's whole return, and learned by its own updates."""
+
+    def __init__(
+        self, task: Task, config: PPOConfig, streams: Streams, actor: Actor, compute: Compute, loop: UpdateLoop
+    ) -> None:
+        super().__init__(actor, compute)
+        self.config, self.streams, self.loop = config, streams, loop
+        self.value = DesignValue(task, streams["design value weights"])
+        self.modules["design_value"] = self.value
+        self.optimizers["design"] = adam(actor.design_parameters(), config.design_learning_rate)
+        self.optimizers["design_value"] = adam(self.value.parameters(), config.value_learning_rate)
+
+    def learn(self, batch: Trajectories) -> dict[str, float]:
+        """Improve designer and design value on the design steps (d,) of `batch`."""
+        config, tensor = self.config, self.compute.tensor
+        where = batch.is_design & batch.valid
+        observation, design = tensor(batch.observation[where]), tensor(batch.design[where])
+        # Undiscounted: the design acts through the whole episode, and discounting would fade out late success.
+        returns = tensor(episode_returns(batch.reward, batch.episode_end)[where].astype(np.float32))
+        if config.normalize_observations:
+            self.value.update_statistics(observation)
+        self.value.update_returns(returns)
+        with torch.no_grad():
+            advantage = normalized(returns - self.value.denormalized(observation))
+        policy = PolicyUpdate(
+            PolicyLoss.of(config, config.design_kl_threshold),
+            self._of_designs(observation, design),
+            self.optimizers["design"],
+            tensor(batch.extras[LOG_PROB][where]),
+            advantage,
+        )
+        target = self.value.normalized(returns)
+        value = ValueUpdate(self.value, self.optimizers["design_value"], observation, target, config.max_gradient_norm)
+        rows, rng = np.arange(len(returns)), self.streams["design minibatches"]
+        self.loop.run((policy, value), rows, config.design_epochs, config.design_minibatch_size, rng)
+        return {"design_kl": policy.divergence, "design_steps": float(policy.steps), "design_value_loss": value.loss}
+
+    def _of_designs(self, observation: Tensor, design: Tensor) -> LogProbs:
+        """Return the log-probabilities of designs (d, D), given their observations (d, O), as a function of rows."""
+
+        def of_designs(rows: Slots) -> tuple[Tensor, Tensor]:
+            index = self.compute.tensor(rows)
+            mean, log_std = self.actor.design(observation[index])
+            return gaussian(mean, log_std, design[index])
+
+        return of_designs

@@ -1,0 +1,100 @@
+"""Transitions of two-phase episodes, and a buffer of the latest of them for off-policy learners.
+
+Shapes: `n` transitions, `O` observation, `D` design, `C` control.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from codesign_bench.learning.trajectories import Trajectories
+from codesign_bench.method import Array
+from codesign_bench.task import Booleans, Singles, Slots, Task
+
+
+@dataclass(frozen=True)
+class Transitions:
+    """Single steps, in any order: the design step is one like the others, whose action is a design."""
+
+    observation: Singles
+    """(n, O)"""
+    is_design: Booleans
+    """(n,)"""
+    design: Singles
+    """(n, D) zero at control steps."""
+    control: Singles
+    """(n, C) zero at design steps."""
+    reward: Singles
+    """(n,)"""
+    next_observation: Singles
+    """(n, O) arbitrary where `terminated`."""
+    terminated: Booleans
+    """(n,) whether success or failure ended the episode; the time limit does not count."""
+
+    @classmethod
+    def of(cls, batch: Trajectories) -> Transitions:
+        """Return the valid steps of `batch`."""
+        arrays = {field.name: getattr(batch, field.name)[batch.valid] for field in fields(cls)}
+        return cls(**{**arrays, "reward": arrays["reward"].astype(np.float32)})
+
+    @classmethod
+    def empty(cls, count: int, task: Task) -> Transitions:
+        """Return room for `count` transitions of `task`."""
+
+        def singles(*size: int) -> Singles:
+            return np.zeros((count, *size), dtype=np.float32)
+
+        observation, design, control = task.layout.size, task.design_space.size, task.control_space.size
+        return cls(
+            observation=singles(observation),
+            is_design=np.zeros(count, dtype=bool),
+            design=singles(design),
+            control=singles(control),
+            reward=singles(),
+            next_observation=singles(observation),
+            terminated=np.zeros(count, dtype=bool),
+        )
+
+    def rows(self, index: Slots | slice) -> Transitions:
+        """Return some of the transitions."""
+        return Transitions(**{name: array[index] for name, array in vars(self).items()})
+
+    def __len__(self) -> int:
+        return len(self.reward)
+
+
+class ReplayBuffer:
+    """The latest transitions; new ones overwrite the oldest."""
+
+    def __init__(self, capacity: int, task: Task) -> None:
+        self.added = 0
+        """Number of transitions ever added."""
+        self._store = Transitions.empty(capacity, task)
+
+    def __len__(self) -> int:
+        return min(self.added, len(self._store))
+
+    def add(self, new: Transitions) -> None:
+        """Add transitions, in their order."""
+        rows = (self.added + np.arange(len(new))) % len(self._store)
+        latest = slice(max(0, len(new) - len(self._store)), None)  # The rest would overwrite itself.
+        for name, array in vars(self._store).items():
+            array[rows[latest]] = getattr(new, name)[latest]
+        self.added += len(new)
+
+    def sample(self, count: int, rng: np.random.Generator) -> Transitions:
+        """Return `count` transitions, drawn with replacement, all with the same probability."""
+        return self._store.rows(rng.integers(len(self), size=count))
+
+    def arrays(self) -> dict[str, Array]:
+        """Return what `load` takes back, for `State.large`: no copies."""
+        return {**vars(self._store.rows(slice(len(self)))), "added": np.array(self.added)}
+
+    def load(self, arrays: Mapping[str, Array]) -> None:
+        """Restore what `arrays` returned."""
+        self.added = int(arrays["added"])
+        for name, array in vars(self._store).items():
+            array[: len(self)] = arrays[name]

@@ -1,0 +1,123 @@
+"""Batches of whole episodes, whoever collected them and whatever is learned from them.
+
+Shapes: `S` slots, `T` steps, `n` valid steps, `O` observation, `D` design, `C` control.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from codesign_bench.task import Booleans, Floats, Singles
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """Steps of whole episodes, one episode after another in each slot; rows beyond a slot's last are not `valid`."""
+
+    observation: Singles
+    """(S, T, O) what the explorer saw."""
+    control: Singles
+    """(S, T, C) sampled controls, before clipping; zero at design steps."""
+    design: Singles
+    """(S, T, D) sampled designs, before clipping; zero at control steps."""
+    reward: Floats
+    """(S, T)"""
+    is_design: Booleans
+    """(S, T)"""
+    terminated: Booleans
+    """(S, T)"""
+    truncated: Booleans
+    """(S, T)"""
+    success: Booleans
+    """(S, T) whether the step solved the task."""
+    valid: Booleans
+    """(S, T)"""
+    final_observation: Singles
+    """(S, T, O) the state after a truncated step; zero elsewhere."""
+    extras: dict[str, Singles] = field(default_factory=dict)
+    """Name -> (S, T, ...) what the explorer said of its actions; zero at steps of which it said nothing."""
+    reward_terms: dict[str, float] = field(default_factory=dict)
+    """Name -> sum over all steps of what the task or the trade-off names as a part of the reward."""
+
+    @classmethod
+    def empty(cls, slots: int, steps: int, observation: int, control: int, design: int) -> Trajectories:
+        """Return room for `slots` x `steps` steps with the given sizes of observations and actions."""
+
+        def singles(size: int) -> Singles:
+            return np.zeros((slots, steps, size), dtype=np.float32)
+
+        def booleans() -> Booleans:
+            return np.zeros((slots, steps), dtype=bool)
+
+        return cls(
+            observation=singles(observation),
+            control=singles(control),
+            design=singles(design),
+            reward=np.zeros((slots, steps)),
+            is_design=booleans(),
+            terminated=booleans(),
+            truncated=booleans(),
+            success=booleans(),
+            valid=booleans(),
+            final_observation=singles(observation),
+        )
+
+    @property
+    def env_steps(self) -> int:
+        """Number of environment steps, design steps included."""
+        return int(self.valid.sum())
+
+    @property
+    def episode_end(self) -> Booleans:
+        """(S, T) last steps of episodes."""
+        return self.terminated | self.truncated
+
+    @property
+    def next_observation(self) -> Singles:
+        """(S, T, O) the state after each step, for learners from single transitions; arbitrary after termination."""
+        result = self.final_observation.copy()
+        going = ~self.episode_end[:, :-1]
+        result[:, :-1][going] = self.observation[:, 1:][going]
+        return result
+
+    def summary(self) -> dict[str, float]:
+        """Return mean return, length and success rate of the sampled episodes, and the mean of each reward term."""
+        episodes = max(1, int(self.episode_end.sum()))
+        return {
+            "train_return": float(self.reward.sum()) / episodes,
+            "train_success": int(self.success.sum()) / episodes,
+            "train_episode_length": float((self.valid & ~self.is_design).sum()) / episodes,
+            **{f"reward_{name}": total / episodes for name, total in self.reward_terms.items()},
+        }
+
+
+def joined(groups: Sequence[Trajectories]) -> Trajectories:
+    """Return the slots of all groups, one group after the other, as one batch."""
+    if len(groups) == 1:
+        return groups[0]
+    length = max(group.valid.shape[1] for group in groups)
+
+    def together(parts: Iterable[np.ndarray]) -> np.ndarray:
+        return np.concatenate([_padded(part, length) for part in parts])
+
+    first = vars(groups[0])
+    arrays = {
+        name: together(getattr(group, name) for group in groups) for name, value in first.items() if _is_array(value)
+    }
+    extras = {name: together(group.extras[name] for group in groups) for name in groups[0].extras}
+    terms = {name: sum(group.reward_terms[name] for group in groups) for name in groups[0].reward_terms}
+    return Trajectories(**arrays, extras=extras, reward_terms=terms)
+
+
+def _is_array(value: object) -> bool:
+    return isinstance(value, np.ndarray)
+
+
+def _padded(values: np.ndarray, length: int) -> np.ndarray:
+    """Return (S, T, ...) `values` with rows of zeros up to `length` steps."""
+    missing = [(0, 0)] * values.ndim
+    missing[1] = (0, length - values.shape[1])
+    return np.pad(values, missing)

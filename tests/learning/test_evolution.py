@@ -12,6 +12,8 @@ from codesign_bench.learning.evolution import Evolution, EvolutionConfig, paper_
 from codesign_bench.paper_tables import CMA_ES_SWEEP
 from codesign_bench.task import Floats
 
+pytestmark = pytest.mark.numeric
+
 CONFIG = EvolutionConfig(popsize=8, sigma0=0.3)
 OPTIMUM = np.array([0.3, -0.5, 0.1, 0.0, 0.7])
 

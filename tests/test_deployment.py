@@ -193,6 +193,7 @@ def test_the_shipped_deployment_is_the_papers_whole_protocol() -> None:
     assert trials.loc[("lift_cup", "own")].tolist() == [5, 5, 5, 5]
 
 
+@pytest.mark.numeric
 @pytest.mark.skipif(not REFERENCE.exists(), reason="a source distribution leaves the results out")
 @pytest.mark.parametrize(("name", "tool"), [("fetch_cube", 2), ("lift_cup", 4)])
 def test_a_shipped_policy_succeeds_on_the_panda_as_its_table_says(name: str, tool: int, tmp_path: Path) -> None:
@@ -200,8 +201,10 @@ def test_a_shipped_policy_succeeds_on_the_panda_as_its_table_says(name: str, too
     (again,) = deploy(task, policy, Order(TRIAL, tools=(tool,), gifs=False), tmp_path, lambda line: None)
     frame = load_deployment(REFERENCE)
     told = frame[(frame["task"] == name) & (frame["kind"] == "own") & (frame["tool"] == tool) & (frame["trial"] == 1)]
+    # Another processor rounds otherwise. Under no instruction set did that move a success by a single step; where
+    # contact makes more of it, the same course comes to its end a few steps earlier or later.
     assert again["success"] == told["success"].item() == 1
-    assert again["steps"] == pytest.approx(told["steps"].item(), abs=5), "another processor rounds otherwise"
+    assert again["steps"] == pytest.approx(told["steps"].item(), abs=5)
 
 
 def test_a_policy_of_another_task_is_refused() -> None:

@@ -8,6 +8,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -71,22 +72,48 @@ def test_the_folder_stays_small() -> None:
 FIRST_SEEDS = sorted(path.parent for path in REFERENCE.glob("*/*/default/seed-00/cell.json"))
 
 
-@pytest.mark.parametrize("folder", FIRST_SEEDS, ids=lambda folder: "-".join(folder.parts[-4:-2]))
-def test_a_shipped_policy_gets_the_shipped_return(folder: Path) -> None:
-    task, method = folder.parts[-4:-2]
-    frame = cb.load_results(REFERENCE)
-    cell = (
-        (frame["task"] == task) & (frame["method"] == method) & (frame["variant"] == "default") & (frame["seed"] == 0)
-    )
-    rows = frame[cell].sort_values("env_steps")
-    evaluation = evaluate(cb.load_task(task), cb.load_policy(folder))
-    # Another processor rounds otherwise, and contact makes more of it: a few of 128 episodes may then end otherwise.
-    value = rows["return_mean"].iloc[-1]
-    assert evaluation.summary["return_mean"] == pytest.approx(value, abs=0.1 * max(1.0, abs(value)))
-    assert evaluation.summary["success_rate"] == pytest.approx(rows["success_rate"].iloc[-1], abs=0.06)
+OTHERWISE = 8
+"""At most so many of a policy's 128 episodes may end otherwise on another machine.
+
+Of all 30 policies' 3,840 episodes, 4 did on another maker's processor, and up to 5 under other instruction sets; never
+more than 3 of one policy's. With a mean of 2, more than 8 come once in 4,000 times.
+"""
+ALIKE = 1e-4
+"""Half of a policy's episodes get the same return, to this share of it or of one.
+
+Rounding changes actions by some 1e-6, and only some contacts make much more of that.
+"""
 
 
-@pytest.mark.parametrize("folder", FIRST_SEEDS, ids=lambda folder: "-".join(folder.parts[-4:-2]))
+def named(folder: Path) -> str:
+    """Return the name of a cell among the tests."""
+    return "-".join(folder.parts[-4:-2])
+
+
+@pytest.mark.parametrize(
+    "folder",
+    [pytest.param(f, marks=pytest.mark.numeric if "gnn_ppo" in f.parts else ()) for f in FIRST_SEEDS],
+    ids=named,
+)
+def test_a_shipped_policy_gets_the_shipped_returns(folder: Path) -> None:
+    shipped = pd.read_csv(folder / "evaluation.csv")
+    evaluation = evaluate(cb.load_task(folder.parts[-4]), cb.load_policy(folder))
+    value = shipped["return"].to_numpy()
+    assert np.median(np.abs(evaluation.returns - value) / np.maximum(1.0, np.abs(value))) < ALIKE
+    assert (evaluation.successes != shipped["success"]).sum() <= OTHERWISE
+    # Whatever an episode comes to, it hardly leaves the range of the others.
+    share = OTHERWISE / len(value)
+    assert evaluation.returns.mean() == pytest.approx(value.mean(), abs=share * np.ptp(value) + ALIKE)
+
+
+@pytest.mark.parametrize("folder", FIRST_SEEDS, ids=named)
+def test_the_evaluation_of_a_shipped_cell_is_the_end_of_its_curve(folder: Path) -> None:
+    curve, episodes = pd.read_csv(folder / "curve.csv"), pd.read_csv(folder / "evaluation.csv")
+    assert episodes["return"].mean() == pytest.approx(curve["return_mean"].iloc[-1])
+    assert episodes["success"].mean() == pytest.approx(curve["success_rate"].iloc[-1])
+
+
+@pytest.mark.parametrize("folder", FIRST_SEEDS, ids=named)
 def test_the_default_profile_is_what_the_shipped_cells_were_run_with(folder: Path) -> None:
     task, method = folder.parts[-4:-2]
     stored = read_cell(folder)

@@ -20,6 +20,8 @@ from codesign_bench.evaluate import evaluate
 from codesign_bench.registry import load_module
 from codesign_bench.task import Behaviour, Floats, Singles, load_task
 
+pytestmark = pytest.mark.numeric
+
 catch: Any = load_module("tasks", "catch_balls")
 SLOT = np.array([0])
 IDLE = np.zeros((1, 1))

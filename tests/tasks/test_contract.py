@@ -17,6 +17,8 @@ from codesign_bench.errors import UserError
 from codesign_bench.method import Problem
 from codesign_bench.task import Booleans, Floats, Singles, Task, load_task, task_names
 
+pytestmark = pytest.mark.numeric
+
 EPISODES = 4
 STEPS = 60
 """Control steps of the rollouts that are compared; enough for tools to meet what they move."""

@@ -25,6 +25,8 @@ from codesign_bench.paper_tables import PROTOCOL
 from codesign_bench.registry import load_module
 from codesign_bench.task import Behaviour, Floats, Singles, load_task
 
+pytestmark = pytest.mark.numeric
+
 fetch: Any = load_module("tasks", "fetch_cube")
 SLOT = np.array([0])
 HALF = 0.5 * fetch.CUBE_SIZE

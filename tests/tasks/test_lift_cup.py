@@ -19,6 +19,8 @@ from codesign_bench.episodes import Episodes
 from codesign_bench.registry import load_module
 from codesign_bench.task import Behaviour, Floats, load_task
 
+pytestmark = pytest.mark.numeric
+
 lift: Any = load_module("tasks", "lift_cup")
 bullet: Any = inspect.getmodule(lift.BulletSimulator)
 SLOT = np.array([0])

@@ -12,6 +12,8 @@ from codesign_bench import load_task
 from codesign_bench.deployment.robot import IDEAL, PANDA, ArmReport
 from codesign_bench.episodes import Episodes
 
+pytestmark = pytest.mark.numeric
+
 kinematics: Any = import_module("codesign_bench.tasks._panda_kinematics")
 panda: Any = import_module("codesign_bench.tasks._panda")
 pybullet: Any = import_module("pybullet")

@@ -19,6 +19,8 @@ from codesign_bench.evaluate import evaluate
 from codesign_bench.registry import load_module
 from codesign_bench.task import Behaviour, Floats, Singles, load_task
 
+pytestmark = pytest.mark.numeric
+
 scoop: Any = load_module("tasks", "scoop")
 SLOT = np.array([0])
 IDLE = np.zeros((1, 3))

@@ -20,6 +20,8 @@ from codesign_bench.registry import load_module
 from codesign_bench.sensitivity import GivenTools
 from codesign_bench.task import Floats, load_task
 
+pytestmark = pytest.mark.numeric
+
 scoop: Any = load_module("tasks", "scoop_3d")
 SLOT = np.array([0])
 LIFT = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])

@@ -20,6 +20,8 @@ from codesign_bench.episodes import Episodes
 from codesign_bench.evaluate import evaluate
 from codesign_bench.task import Behaviour, Floats, Simulator, Soundness, Task, load_task, task_names
 
+pytestmark = pytest.mark.numeric
+
 SLOTS = 16
 HELD_STEPS = 8
 """Random controls last so long, so that tools travel."""

@@ -42,9 +42,9 @@ SMALL = {
     "minibatch_size": 200,
     "epochs": 3,
     "design_credit": "joint",
-    "kl_threshold": 0.05,  # So low that a batch's policy update is cut short, too.
+    "kl_threshold": 0.0125,  # So low that the policy's update is cut short, and would go on if it looked again.
     "max_gradient_norm": 0.3,  # So low that gradients are clipped.
-    "policy_learning_rate": 3e-3,
+    "policy_learning_rate": 1e-3,
     "value_learning_rate": 3e-3,
 }
 Weights = dict[str, Tensor]

@@ -17,15 +17,26 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip
 SETUP := setup.cfg pyproject.toml constraints.txt
 
+NUMERIC_TESTS := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -p no:cacheprovider -m "numeric and not slow"
+
 TASK ?= push
 METHOD ?= all
 SEEDS ?= 6
 PROFILE ?= quick
 
-.PHONY: help run test check slow install clean
+# How the numerical libraries are made to compute as on processors without newer instructions. In turn: torch's own
+# kernels, MKL's and oneDNN's products in torch, OpenBLAS's in numpy, numpy's own kernels (named one way up to numpy 2.3
+# and another way since), and the C library's functions. A library ignores what it does not know.
+WITHOUT_AVX512 := ATEN_CPU_CAPABILITY=avx2 MKL_ENABLE_INSTRUCTIONS=AVX2 ONEDNN_MAX_CPU_ISA=AVX2 \
+	OPENBLAS_CORETYPE=Haswell NPY_DISABLE_CPU_FEATURES=X86_V4,AVX512F,AVX512_SKX,AVX512_ICL,AVX512_SPR
+WITHOUT_AVX := ATEN_CPU_CAPABILITY=default MKL_CBWR=COMPATIBLE ONEDNN_MAX_CPU_ISA=SSE41 OPENBLAS_CORETYPE=Nehalem \
+	NPY_DISABLE_CPU_FEATURES=X86_V3,AVX2,FMA3,X86_V4,AVX512F,AVX512_SKX,AVX512_ICL,AVX512_SPR \
+	GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA
+
+.PHONY: help run test test-portable without-avx512 without-avx check slow install clean
 
 help: ## list the targets
-	@grep -hE '^[a-z]+:.*## ' Makefile | sed -E 's/^([a-z]+):.*## (.*)/  make \1\t\2/' | expand -t 20
+	@grep -hE '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 22
 
 run: .venv/installed ## set up, train every method on push in a few minutes, draw the learning curves
 	$(BIN)/codesign-bench run --method $(METHOD) --task $(TASK) --seeds $(SEEDS) --profile $(PROFILE)
@@ -36,6 +47,15 @@ test: .venv/installed-test ## set up, check style and types, run the fast tests
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q
+
+test-portable: .venv/installed-test ## run the tests that compare numbers under other instruction sets
+	$(MAKE) --no-print-directory -j2 --output-sync=target without-avx512 without-avx
+
+without-avx512: .venv/installed-test
+	$(WITHOUT_AVX512) $(NUMERIC_TESTS)
+
+without-avx: .venv/installed-test
+	$(WITHOUT_AVX) $(NUMERIC_TESTS)
 
 check: .venv/installed-test ## check style and types alone
 	$(BIN)/ruff check .

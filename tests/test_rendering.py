@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import VERSION_0_1_0
 from PIL import Image
 
+from builders import VERSION_0_1_0
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.rendering import CAPTION_PIXELS, FRAMES_PER_SECOND, MOMENTS, render

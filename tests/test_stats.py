@@ -13,6 +13,8 @@ from scipy.stats import trim_mean
 
 from codesign_bench import stats
 
+pytestmark = pytest.mark.numeric
+
 
 def curve(
     seed: int, steps: list[int], values: list[float], *, method: str = "gnn_ppo", variant: str = "default"

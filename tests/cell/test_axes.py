@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from builders import sweep, toy_cells
 
+from builders import sweep, toy_cells
 from codesign_bench import load_policy, load_results
 from codesign_bench.cell.axes import axes, axis_named, parse_axis_value
 from codesign_bench.cell.cell import Cell, resolve_cell, resolve_cells

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import rising, store_cell
 
+from builders import rising, store_cell
 from codesign_bench.claims.claim import Claim, Rule
 from codesign_bench.claims.evidence import Evidence, load_evidence
 from codesign_bench.claims.finding import CONTRADICTED, NOT_ASKED, SUPPORTED, UNDECIDED, VERDICTS, Finding, Lacking

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from builders import VERSION_0_1_0
 from PIL import Image
 
+from builders import VERSION_0_1_0
 from codesign_bench import load_task, task_names
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from builders import rising, store_cell
 
+from builders import rising, store_cell
 from codesign_bench.cli import main
 from codesign_bench.figures.comparison import with_compared
 from codesign_bench.registry import load_module

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from builders import VERSION_0_1_0
 
+from builders import VERSION_0_1_0
 from codesign_bench.errors import UserError
 from codesign_bench.figures.designed_tools import LINE_LENGTH, Place, designed_tools, spread
 from codesign_bench.figures.drawing import draw_figures

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import store_cell
 
+from builders import store_cell
 from codesign_bench.cell.variant import Variant
 from codesign_bench.errors import UserError
 from codesign_bench.figures.generalization import outcomes_by_region, regions

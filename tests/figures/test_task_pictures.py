@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from builders import store_cell
 
+from builders import store_cell
 from codesign_bench.errors import UserError
 from codesign_bench.figures.drawing import draw_figures
 from codesign_bench.figures.source import Request

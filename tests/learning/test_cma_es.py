@@ -11,6 +11,8 @@ import pytest
 from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
 from codesign_bench.task import Floats
 
+pytestmark = pytest.mark.numeric
+
 CONFIG = EvolutionConfig(popsize=8, sigma0=0.3)
 OPTIMUM = np.array([0.3, -0.5, 0.1, 0.0, 0.7])
 

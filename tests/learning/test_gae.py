@@ -9,6 +9,8 @@ import pytest
 
 from codesign_bench.learning.gae import episode_returns, generalized_advantages
 
+pytestmark = pytest.mark.numeric
+
 
 def advantages(gamma: float = 0.5, gae_lambda: float = 0.5, **rows: list[float]) -> list[float]:
     """Return the advantages of one slot, (T,), from rows (T,) of numbers."""

@@ -25,10 +25,15 @@ from codesign_bench.learning.networks import (
     torch_generator,
 )
 from codesign_bench.task import ToolGraph, load_task
+from tolerances import DOUBLE, SINGLE, of_network, of_sum
+
+pytestmark = pytest.mark.numeric
 
 RECORD = json.loads((Path(__file__).parent.parent / "data" / "graph_convolution.json").read_text(encoding="utf-8"))
 STAR = ToolGraph(num_nodes=5, edges=((0, 1), (1, 2), (2, 3), (1, 4)), parameter_nodes=(0, 1, 2, 3, 4))
 CHAIN = ToolGraph(num_nodes=3, edges=((0, 1), (1, 2)), parameter_nodes=(0, 1, 2))
+LARGEST = 4.0
+"""Hardly a standard normal number is larger."""
 
 
 def generator(seed: int = 0) -> torch.Generator:
@@ -49,7 +54,8 @@ def test_graph_convolution_gives_the_recorded_numbers_of_torch_geometric() -> No
         layer.neighbours.weight.copy_(torch.tensor(RECORD["neighbours_weight"]))
         layer.neighbours.bias.copy_(torch.tensor(RECORD["bias"]))
         output = layer(torch.tensor(RECORD["x"])[:, None])[:, 0]
-    np.testing.assert_allclose(output.numpy(), RECORD["output"], atol=1e-6)
+    # A sum over three inputs of a node and of up to three neighbours, and the bias; no product exceeds one.
+    np.testing.assert_allclose(output.numpy(), RECORD["output"], rtol=0, atol=of_sum(3 + 3 * 3 + 1, 13.0))
 
 
 def test_graph_network_equals_torch_geometric_live() -> None:
@@ -65,7 +71,9 @@ def test_graph_network_equals_torch_geometric_live() -> None:
             reference.lin_rel.weight.copy_(layer.neighbours.weight)
             reference.lin_rel.bias.copy_(layer.neighbours.bias)
             expected = torch.relu(reference(expected, edges))
-        np.testing.assert_allclose(network(shared, own).numpy(), expected.numpy(), atol=1e-5)
+        widths, neighbours = (4 + 2, 2 * 8, 2 * 8, 2 * 8), 3.0  # A convolution sums over a node and its neighbours.
+        tolerance = of_network(widths, neighbours * LARGEST)
+        np.testing.assert_allclose(network(shared, own).numpy(), expected.numpy(), rtol=0, atol=tolerance)
 
 
 @pytest.mark.parametrize("graph", [STAR, CHAIN])
@@ -78,7 +86,9 @@ def test_computing_only_the_needed_nodes_changes_nothing(graph: ToolGraph, layer
         part = GraphNetwork(4, 2, (8,) * layers, graph, read, generator())
         part.load_state_dict(whole.state_dict())
         with torch.no_grad():
-            np.testing.assert_allclose(part(shared, own).numpy(), whole(shared, own)[read].numpy(), atol=1e-6)
+            found, expected = part(shared, own).numpy(), whole(shared, own)[read].numpy()
+            tolerance = of_network((4 + 2, *[2 * 8] * layers), LARGEST)
+            np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance)
 
 
 def test_a_node_sees_as_far_as_there_are_layers() -> None:
@@ -106,7 +116,8 @@ def test_index_mlp_is_one_perceptron_per_node() -> None:
                 layer.weight.copy_(network.weights[index][node].t())
                 layer.bias.copy_(network.biases[index][node, 0])
                 expected = layer(torch.tanh(expected) if index else expected)
-            np.testing.assert_allclose(output[node].numpy(), expected.numpy(), atol=1e-6)
+            tolerance = of_network(sizes[:-1], LARGEST)
+            np.testing.assert_allclose(output[node].numpy(), expected.numpy(), rtol=0, atol=tolerance)
     assert not torch.equal(network.weights[0][0], network.weights[0][1])
 
 
@@ -116,7 +127,8 @@ def test_index_mlp_of_one_node_takes_the_same_path_in_numbers() -> None:
         for small, large in zip(one.parameters(), two.parameters(), strict=True):
             large[:1].copy_(small)
         x = torch.randn(2, 7, 4, generator=generator(2))
-        np.testing.assert_allclose(one(x[:1])[0].numpy(), two(x)[0].numpy(), atol=1e-6)
+        tolerance = of_network((4, 8), LARGEST)
+        np.testing.assert_allclose(one(x[:1])[0].numpy(), two(x)[0].numpy(), rtol=0, atol=tolerance)
 
 
 def test_last_layers_start_small_and_without_bias() -> None:
@@ -125,7 +137,7 @@ def test_last_layers_start_small_and_without_bias() -> None:
     assert 0.0 < network.weights[-1].abs().max() <= IndexMLP.OUTPUT_SCALE * 64**-0.5
     assert network.weights[0].abs().max() > IndexMLP.OUTPUT_SCALE * 64**-0.5
     small, usual = MLP([64, 64, 2], generator(), output_scale=0.1), MLP([64, 64, 2], generator())
-    np.testing.assert_allclose(small[-1].weight.detach(), 0.1 * usual[-1].weight.detach())
+    np.testing.assert_allclose(small[-1].weight.detach(), 0.1 * usual[-1].weight.detach(), rtol=2.0 * SINGLE)
     assert not small[-1].bias.any()
     assert usual[-1].bias.any()
     np.testing.assert_array_equal(small[0].weight.detach(), usual[0].weight.detach())
@@ -154,18 +166,21 @@ def test_running_norm_follows_mean_and_variance_over_batches() -> None:
     for batch in batches:
         norm.update(torch.from_numpy(batch))
     values = np.concatenate(batches)
-    np.testing.assert_allclose(norm.mean.numpy(), values.mean(axis=0), rtol=1e-9)
-    np.testing.assert_allclose(norm.variance.numpy(), values.var(axis=0), rtol=1e-9)
+    largest = np.abs(values).max()
+    np.testing.assert_allclose(norm.mean.numpy(), values.mean(axis=0), rtol=0, atol=of_sum(306, largest, DOUBLE))
+    np.testing.assert_allclose(norm.variance.numpy(), values.var(axis=0), rtol=0, atol=of_sum(306, largest**2, DOUBLE))
     assert norm.count == len(values)
     normal = norm(torch.from_numpy(values).float()).numpy()
     expected = (values - values.mean(axis=0)) / values.std(axis=0)
-    np.testing.assert_allclose(normal, expected.clip(-5.0, 5.0), atol=1e-4)
+    tolerance = of_sum(4, (largest / values.std(axis=0)).max())  # value, mean, scale and result are rounded
+    np.testing.assert_allclose(normal, expected.clip(-5.0, 5.0), rtol=0, atol=tolerance)
 
 
 def test_running_norm_clips_and_knows_the_bounds_before_the_first_batch() -> None:
     norm = RunningNorm([2.0], [10.0])
     values = torch.tensor([[2.0], [6.0], [10.0], [1e6]])
-    np.testing.assert_allclose(norm(values)[:, 0].numpy(), [-2.0, 0.0, 2.0, RunningNorm.CLIP], atol=1e-5)
+    expected = [-2.0, 0.0, 2.0, RunningNorm.CLIP]
+    np.testing.assert_allclose(norm(values)[:, 0].numpy(), expected, rtol=0, atol=of_sum(4, 10.0 / 2.0))
     constant = RunningNorm([0.0], [1.0])
     constant.update(torch.full((4, 1), 3.0))
     assert constant(torch.tensor([[3.0]])).item() == 0.0
@@ -207,4 +222,4 @@ def test_perceptrons_have_tanh_between_linear_layers() -> None:
         for layer, following in pairwise([*linears, None]):
             expected = expected @ layer.weight.t() + layer.bias
             expected = torch.tanh(expected) if following is not None else expected
-        np.testing.assert_allclose(network(x).numpy(), expected.numpy(), atol=1e-6)
+        np.testing.assert_allclose(network(x).numpy(), expected.numpy(), rtol=0, atol=of_network((3, 8, 4), LARGEST))

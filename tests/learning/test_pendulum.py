@@ -16,6 +16,8 @@ import pytest
 
 from codesign_bench.task.episodes import Episodes
 
+pytestmark = pytest.mark.numeric
+
 HERE = Path(__file__).parent
 RECORD = HERE.parent / "data" / "pendulum_stable_baselines3.json"
 
@@ -40,8 +42,8 @@ def test_the_task_is_gymnasiums_pendulum(pendulum: Any) -> None:
         controls = rng.uniform(-1.0, 1.0, size=(3, 1))
         reward, terminated, truncated = episodes.control(slots, controls)
         seen, expected, *ends = reference.step(pendulum.MAX_TORQUE * controls[1])[:4]
-        np.testing.assert_allclose(episodes.observation[1, task.layout.state], seen, atol=1e-6)
-        assert reward[1] == pytest.approx(float(expected))
+        np.testing.assert_array_equal(episodes.observation[1, task.layout.state], seen)
+        assert reward[1] == expected
         assert [terminated[1], truncated[1]] == ends == [False, step == task.horizon - 1]
 
 
@@ -67,5 +69,6 @@ def test_it_learns_like_stable_baselines3(pendulum: Any) -> None:
     record = json.loads(RECORD.read_text(encoding="utf-8"))
     assert record["env_steps"] == pendulum.BUDGET
     reference = record["stable_baselines3"]
-    # Seeds of either differ widely; an untrained policy earns about -1200, one that only half swings up about -700.
+    # The same seed is another draw on another processor, and seeds of either differ widely; an untrained policy earns
+    # about -1200, one that only half swings up about -700.
     assert pendulum.train(seed=0) > reference["mean"] - 2.0 * reference["standard_deviation"] > -600.0

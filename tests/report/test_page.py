@@ -14,9 +14,9 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from builders import rising, store_cell
 
 import codesign_bench
+from builders import rising, store_cell
 from codesign_bench.cell.variant import Variant
 from codesign_bench.claims.claim import Claim, Rule
 from codesign_bench.claims.finding import Finding

@@ -11,6 +11,7 @@ import sys
 from itertools import groupby
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -24,7 +25,7 @@ from codesign_bench.deployment.deploy import Order, deploy
 from codesign_bench.deployment.tables import load_deployment
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.storage.cells import StoredCell, find_cells
-from codesign_bench.storage.layout import POLICY_FILE
+from codesign_bench.storage.layout import EVALUATION_FILE, POLICY_FILE
 from codesign_bench.storage.policies import policy_and_task
 
 REFERENCE = Path(__file__).resolve().parents[2] / "results" / "reference"
@@ -88,13 +89,41 @@ def test_the_folder_stays_small() -> None:
     assert sum(path.stat().st_size for path in REFERENCE.rglob("*") if path.is_file()) < 60e6
 
 
-@pytest.mark.parametrize("cell", PLAYABLE, ids=name_of)
-def test_a_shipped_policy_gets_the_shipped_return(cell: StoredCell) -> None:
-    told = cell.last_evaluation()
-    summary = evaluate(cb.load_task(cell.record.task), cb.load_policy(cell.folder)).summary
-    # Another processor rounds otherwise, and contact makes more of it: a few of 128 episodes may then end otherwise.
-    assert summary["return_mean"] == pytest.approx(told["return_mean"], abs=0.1 * max(1.0, abs(told["return_mean"])))
-    assert summary["success_rate"] == pytest.approx(told["success_rate"], abs=0.06)
+OTHERWISE = 8
+"""At most so many of a policy's 128 episodes may end otherwise on another machine.
+
+Of 30 policies' 3,840 episodes, 4 did on another maker's processor, and up to 5 under other instruction sets; never
+more than 3 of one policy's. With a mean of 2, more than 8 come once in 4,000 times.
+"""
+ALIKE = 1e-4
+"""Half of a policy's episodes get the same return, to this share of it or of one.
+
+Rounding changes actions by some 1e-6, and only some contacts make much more of that.
+"""
+ONE_PER_TASK = [next(group) for _, group in groupby(PLAYABLE, lambda cell: cell.record.task)]
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [pytest.param(cell, marks=pytest.mark.numeric if cell in ONE_PER_TASK else ()) for cell in PLAYABLE],
+    ids=name_of,
+)
+def test_a_shipped_policy_gets_the_shipped_returns(cell: StoredCell) -> None:
+    shipped = pd.read_csv(cell.folder / EVALUATION_FILE)
+    evaluation = evaluate(cb.load_task(cell.record.task), cb.load_policy(cell.folder))
+    value = shipped["return"].to_numpy()
+    assert np.median(np.abs(evaluation.returns - value) / np.maximum(1.0, np.abs(value))) < ALIKE
+    assert (evaluation.successes != shipped["success"]).sum() <= OTHERWISE
+    # Whatever an episode comes to, it hardly leaves the range of the others.
+    share = OTHERWISE / len(value)
+    assert evaluation.returns.mean() == pytest.approx(value.mean(), abs=share * np.ptp(value) + ALIKE)
+
+
+def test_the_evaluation_of_a_shipped_cell_is_the_end_of_its_curve() -> None:
+    for cell in CELLS:
+        episodes, last = pd.read_csv(cell.folder / EVALUATION_FILE), cell.last_evaluation()
+        assert episodes["return"].mean() == pytest.approx(last["return_mean"]), cell.folder
+        assert episodes["success"].mean() == pytest.approx(last["success_rate"]), cell.folder
 
 
 @pytest.mark.parametrize("cell", FIRST, ids=name_of)
@@ -109,6 +138,7 @@ def test_every_shipped_tool_was_tried_equally_often() -> None:
     assert (trials.groupby(["task", "kind"]).nunique() == 1).all()
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize(("name", "tool"), TOOLS_THAT_WORKED)
 def test_a_shipped_policy_succeeds_on_the_panda_as_its_table_says(name: str, tool: int, tmp_path: Path) -> None:
     (folder,) = (cell.folder for cell in PLAYABLE if (cell.record.task, cell.record.method) == (name, "gnn_ppo"))
@@ -116,5 +146,7 @@ def test_a_shipped_policy_succeeds_on_the_panda_as_its_table_says(name: str, too
     (again,) = deploy(task, policy, Order(TRIAL, tools=(tool,), gifs=False), tmp_path, lambda line: None)
     frame = load_deployment(REFERENCE)
     told = frame[(frame["task"] == name) & (frame["kind"] == "own") & (frame["tool"] == tool) & (frame["trial"] == 1)]
+    # Another processor rounds otherwise. Under no instruction set did that move a success by a single step; where
+    # contact makes more of it, the same course comes to its end a few steps earlier or later.
     assert again["success"] == 1
-    assert again["steps"] == pytest.approx(told["steps"].item(), abs=5), "another processor rounds otherwise"
+    assert again["steps"] == pytest.approx(told["steps"].item(), abs=5)

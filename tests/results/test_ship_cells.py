@@ -9,9 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from builders import VERSION_0_1_0
 
 import codesign_bench as cb
+from builders import VERSION_0_1_0
 from codesign_bench.storage.layout import CHECKPOINT_FILE, LOG_FILE
 from codesign_bench.storage.records import DONE, RUNNING, CellRecord
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from builders import rising, store_cell
 
+from builders import rising, store_cell
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import find_cells, open_cell
 from codesign_bench.storage.layout import cell_lock

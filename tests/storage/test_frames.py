@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from builders import rising, store_cell, sweep, toy_cells
 
+from builders import rising, store_cell, sweep, toy_cells
 from codesign_bench import load_results
 from codesign_bench.cell.variant import Variant
 from codesign_bench.errors import UserError

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import store_cell, sweep, toy_cells
 
+from builders import store_cell, sweep, toy_cells
 from codesign_bench import load_policy
 from codesign_bench.errors import UserError
 from codesign_bench.storage.policies import policy_and_task

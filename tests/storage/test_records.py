@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders import BUDGET, store_cell
 
+from builders import BUDGET, store_cell
 from codesign_bench.cell.variant import Variant
 from codesign_bench.config.settings import Sourced, StoredConfig
 from codesign_bench.errors import UserError

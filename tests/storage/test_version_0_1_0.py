@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import VERSION_0_1_0
 
+from builders import VERSION_0_1_0
 from codesign_bench import load_policy, load_results, load_task
 from codesign_bench.cli import main
 from codesign_bench.evaluation.evaluate import evaluate

@@ -6,9 +6,9 @@ import io
 from pathlib import Path
 
 import pytest
-from builders import toy_cells as cells
 from rich.console import Console
 
+from builders import toy_cells as cells
 from codesign_bench.storage.files import write_json
 from codesign_bench.storage.layout import PROGRESS_FILE
 from codesign_bench.sweep.progress import ProgressDisplay

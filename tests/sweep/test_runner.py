@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
+
 from builders import sweep
 from builders import toy_cells as cells
-
 from codesign_bench import load_results
 from codesign_bench.cell.cell import Cell, resolve_cells
 from codesign_bench.errors import UserError

@@ -20,6 +20,8 @@ from codesign_bench.task import Floats, load_task
 from codesign_bench.task.behaviours import GivenDesigns
 from codesign_bench.task.episodes import Episodes
 
+pytestmark = pytest.mark.numeric
+
 catch: Any = load_module("tasks", "catch_balls")
 script: Any = import_module("codesign_bench.tasks._scripts.catch_balls")
 SLOT = np.array([0])

@@ -21,6 +21,8 @@ from codesign_bench.task.episodes import TRADEOFF_TERM, Episodes, Tradeoff
 from codesign_bench.task.play import Turn
 from codesign_bench.task.play import play as library_play
 
+pytestmark = pytest.mark.numeric
+
 EPISODES = 4
 STEPS = 60
 """Control steps of the rollouts that are compared; enough for tools to meet what they move."""

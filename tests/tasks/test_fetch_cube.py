@@ -18,6 +18,8 @@ from codesign_bench.registry import load_module
 from codesign_bench.task import Floats, load_task
 from codesign_bench.task.episodes import Episodes
 
+pytestmark = pytest.mark.numeric
+
 fetch: Any = load_module("tasks", "fetch_cube")
 SLOT = np.array([0])
 HALF = 0.5 * fetch.CUBE_SIZE

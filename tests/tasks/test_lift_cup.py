@@ -18,6 +18,8 @@ from codesign_bench.registry import load_module
 from codesign_bench.task import Floats, load_task
 from codesign_bench.task.episodes import Episodes
 
+pytestmark = pytest.mark.numeric
+
 lift: Any = load_module("tasks", "lift_cup")
 bullet: Any = inspect.getmodule(lift.BulletSimulator)
 SLOT = np.array([0])

@@ -13,6 +13,8 @@ from codesign_bench.task import deployment_of
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.robot import IDEAL, PANDA, ArmReport
 
+pytestmark = pytest.mark.numeric
+
 kinematics: Any = import_module("codesign_bench.tasks._panda_kinematics")
 panda: Any = import_module("codesign_bench.tasks._panda")
 pybullet: Any = import_module("pybullet")

@@ -18,6 +18,8 @@ from codesign_bench.registry import load_module
 from codesign_bench.task import Floats, load_task
 from codesign_bench.task.episodes import Episodes
 
+pytestmark = pytest.mark.numeric
+
 push: Any = load_module("tasks", "push")
 REACH = push.PUCK_RADIUS + push.LINK_HALF_WIDTH
 """Distance of a link's core from the puck's centre when they touch."""

@@ -16,6 +16,8 @@ from codesign_bench.registry import load_module
 from codesign_bench.task import Floats, load_task
 from codesign_bench.task.episodes import Episodes
 
+pytestmark = pytest.mark.numeric
+
 scoop: Any = load_module("tasks", "scoop")
 SLOT = np.array([0])
 IDLE = np.zeros((1, 3))

@@ -17,6 +17,8 @@ from codesign_bench.registry import load_module
 from codesign_bench.task import Floats, load_task
 from codesign_bench.task.episodes import Episodes
 
+pytestmark = pytest.mark.numeric
+
 scoop: Any = load_module("tasks", "scoop_3d")
 script: Any = import_module("codesign_bench.tasks._scripts.scoop_3d")
 SLOT = np.array([0])

@@ -20,6 +20,8 @@ from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.task import Floats, Simulator, Soundness, Task, load_task, task_names
 from codesign_bench.task.episodes import Episodes
 
+pytestmark = pytest.mark.numeric
+
 SLOTS = 16
 HELD_STEPS = 8
 """Random controls last so long, so that tools travel."""

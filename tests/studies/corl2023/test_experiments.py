@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from builders import VERSION_0_1_0
 from rich.console import Console
 
+from builders import VERSION_0_1_0
 from codesign_bench.studies.corl2023 import experiments
 from codesign_bench.studies.corl2023.experiments import EXPERIMENTS
 from codesign_bench.studies.corl2023.members import METHODS, TASKS

@@ -34,6 +34,17 @@ PPO_BY_TASK: Mapping[str, Mapping[str, Any]] = {
 }
 """What `laptop` and `quick` set otherwise for a task, the same for every PPO-based method."""
 
+SMALL_PPO = {"batch_size": 600, "minibatch_size": 150, "epochs": 2, "design_epochs": 2, "design_minibatch_size": 2}
+SMALL_GRAPHS = {
+    "control_gnn": (16, 16),
+    "control_index_mlp": (16,),
+    "design_gnn": (16, 16),
+    "design_index_mlp": (16,),
+    "value_mlp": (16,),
+}
+SMALL_PERCEPTRONS = {"policy_net": (16, 16), "value_net": (16, 16)}
+"""Parts of what methods return as `small`."""
+
 
 def tuned(profile: str, table: Tuned) -> Settings:
     """Return what `table` sets in one of our own profiles; nothing in any other."""

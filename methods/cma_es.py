@@ -82,9 +82,19 @@ class CmaEs(Method[Config]):
         self.evolution = Evolution(size, config, streams["plans"])
 
     @classmethod
+    def small(cls) -> Mapping[str, Any]:
+        """Return generations of a few episodes."""
+        return {"popsize": 4, "episodes_per_candidate": 1}
+
+    @classmethod
     def profile(cls, profile: str, task_name: str) -> Settings:
         """Return what was tuned for this baseline."""
         return tuned(profile, TUNED)
+
+    @property
+    def shortest_batch(self) -> int:
+        """An episode of every candidate: they are compared on the same instances."""
+        return self.config.popsize * super().shortest_batch
 
     def train(self, remaining_steps: int) -> BatchReport:
         """Try one generation: every candidate on the same few instances; its fitness is the mean return.

@@ -29,7 +29,7 @@ from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Singles, Slots, Task
 
-from ._settings import Tuned, ppo_settings, tuned
+from ._settings import SMALL_PERCEPTRONS, SMALL_PPO, Tuned, ppo_settings, tuned
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +95,11 @@ class CmaRl(Method[Config]):
         self.actor = GivenDesignActor(problem.task, config, streams["policy weights"])
         value = MLPValue(problem.task, config.value_net, streams["value weights"])
         self.learner = TwoPhaseLearner(problem, config, streams, self.actor, value, self._candidates)
+
+    @classmethod
+    def small(cls) -> Mapping[str, Any]:
+        """Return batches of a few episodes and small networks."""
+        return {**SMALL_PPO, **SMALL_PERCEPTRONS, "popsize": 4}
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Settings:

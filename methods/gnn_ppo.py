@@ -5,7 +5,9 @@ Source: the paper, sections "Policy learning" and "Training Hyperparameters & Ar
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from torch import Tensor, nn
@@ -18,7 +20,7 @@ from codesign_bench.learning.ppo_method import PPOMethod
 from codesign_bench.learning.value_networks import GraphValue, ValueNetwork
 from codesign_bench.task import Task
 
-from ._settings import ppo_settings
+from ._settings import SMALL_GRAPHS, SMALL_PPO, ppo_settings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +66,11 @@ class GnnPpo(PPOMethod[Config]):
     name = "gnn_ppo"
     label = "GNN-PPO (paper's)"
     config_class = Config
+
+    @classmethod
+    def small(cls) -> Mapping[str, Any]:
+        """Return batches of a few episodes and small networks."""
+        return {**SMALL_PPO, **SMALL_GRAPHS}
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Settings:

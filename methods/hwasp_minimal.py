@@ -7,7 +7,9 @@ optimiser settings of `gnn_ppo` (appendix "Training Hyperparameters & Architectu
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -21,7 +23,7 @@ from codesign_bench.learning.ppo_method import PPOMethod
 from codesign_bench.learning.value_networks import GraphValue, ValueNetwork
 from codesign_bench.task import Task
 
-from ._settings import Tuned, ppo_settings, tuned
+from ._settings import SMALL_GRAPHS, SMALL_PPO, Tuned, ppo_settings, tuned
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +72,11 @@ class HwaspMinimal(PPOMethod[Config]):
     name = "hwasp_minimal"
     label = "HWasP-minimal"
     config_class = Config
+
+    @classmethod
+    def small(cls) -> Mapping[str, Any]:
+        """Return batches of a few episodes and small networks."""
+        return {**SMALL_PPO, **SMALL_GRAPHS}
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Settings:

@@ -6,6 +6,7 @@ and value, with at least as many trainable parameters as `gnn_ppo` on every task
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,7 +24,7 @@ from codesign_bench.learning.value_networks import MLPValue, ValueNetwork
 from codesign_bench.method import Method, load_method
 from codesign_bench.task import Task, load_task
 
-from ._settings import Tuned, ppo_settings, tuned
+from ._settings import SMALL_PERCEPTRONS, SMALL_PPO, Tuned, ppo_settings, tuned
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +83,11 @@ class SharedArch(PPOMethod[Config]):
     name = "shared_arch"
     label = "shared architecture"
     config_class = Config
+
+    @classmethod
+    def small(cls) -> Mapping[str, Any]:
+        """Return batches of a few episodes and small networks."""
+        return {**SMALL_PPO, **SMALL_PERCEPTRONS}
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Settings:

@@ -3,25 +3,37 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+import pytest
 from rich.console import Console
 
 from codesign_bench.cell.cell import Cell, resolve_cells
 from codesign_bench.cell.grid import grid
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.config.settings import Sourced, StoredConfig
+from codesign_bench.errors import UserError
 from codesign_bench.storage.layout import CURVE_COLUMNS, CURVE_FILE, EVALUATION_FILE, write_rows
 from codesign_bench.storage.records import DONE, CellRecord
 from codesign_bench.sweep.runner import run_sweep
+
+Part = TypeVar("Part")
 
 VERSION_0_1_0 = Path(__file__).parent / "data" / "version_0_1_0"
 """A results folder of version 0.1.0 with a policy in every finished cell; nothing was learned in it."""
 
 BUDGET = StoredConfig(run={"steps": Sourced(1000, "default")}, method={"epochs": Sourced(4, "default")})
 """A configuration with one setting in each part."""
+
+
+def offered(part: Callable[[], Part]) -> Part:
+    """Return what `part` returns; skip the test where a task does without this part of it."""
+    try:
+        return part()
+    except (UserError, NotImplementedError) as error:
+        pytest.skip(f"does without: {error or part}")
 
 
 def store_cell(

@@ -1,4 +1,4 @@
-"""Fixtures that several tests share."""
+"""Fixtures that several tests share, and the choice of members whose promises are tested."""
 
 from __future__ import annotations
 
@@ -10,6 +10,29 @@ from codesign_bench import plugins, registry
 from codesign_bench.sweep.training import CHECKPOINT_SECONDS_VARIABLE
 
 TESTS = Path(__file__).parent
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add `--members`."""
+    parser.addoption(
+        "--members", metavar="NAMES", help="only what is promised of these tasks, methods, figures, studies"
+    )
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out all tests but those that are parametrised by a name of `--members`."""
+    if config.getoption("--members") is None:
+        return
+    wanted = set(config.getoption("--members").split(","))
+    chosen = [item for item in items if isinstance(item, pytest.Function) and wanted & set(parameters(item))]
+    config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
+    items[:] = chosen
+
+
+def parameters(item: pytest.Function) -> list[str]:
+    """Return the text values by which a test is parametrised."""
+    values = item.callspec.params.values() if hasattr(item, "callspec") else ()
+    return [value for value in values if isinstance(value, str)]
 
 
 @pytest.fixture

@@ -5,14 +5,15 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import codesign_bench
 from codesign_bench.config.resolve import resolve
-from codesign_bench.method import Problem, load_method, method_names
+from codesign_bench.method import Problem, load_method
+from codesign_bench.registry import built_in
 from codesign_bench.seeding import Streams
 from codesign_bench.task import load_task, task_names
 from codesign_bench.task.episodes import Tradeoff
@@ -77,12 +78,11 @@ def test_a_row_explains_what_it_names_and_nothing_else() -> None:
     assert unexplained(["kl", "reward_progress", "reward_", "reward", "kl_2"], page) == ["reward_", "reward", "kl_2"]
 
 
-@pytest.mark.parametrize("name", method_names())
+@pytest.mark.parametrize("name", built_in("methods"))
 def test_every_logged_value_is_explained_on_the_methods_page(name: str) -> None:
     method_class, task_name = load_method(name), task_names()[0]
     config = resolve(method_class, task_name, "quick").method
-    small = {"batch_size": 320, "minibatch_size": 100, "epochs": 1, "episodes_per_candidate": 1, "popsize": 2}
-    config = replace(config, **{key: value for key, value in small.items() if key in {f.name for f in fields(config)}})
+    config = replace(config, **method_class.small())
     problem = Problem(load_task(task_name), tradeoff=Tradeoff(alpha=0.5, scale=1.0))
     report = method_class(problem, config, Streams(0)).train(320)
     page = ROOT / "docs" / "methods" / f"{name}.md"

@@ -162,3 +162,24 @@ def test_an_off_policy_learner_learns_to_reach(seed: int, monkeypatch: pytest.Mo
     while left > 0:
         left -= method.train(left).env_steps
     assert start < 0.2 < 0.8 <= evaluate(method.problem.task, method.policy()).summary["success_rate"]
+
+
+MEMBERS = ("reach", "random_search", "sac", "tool_lengths", "fitting_lengths")
+
+
+def test_its_members_keep_every_promise_that_is_tested_of_members(installed: Path) -> None:
+    # All tests, of all that this suite asks of a task, a method, a figure or a study, with the package installed.
+    line = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-v", "--members", ",".join(MEMBERS)]
+    environment = {**os.environ, "PYTHONPATH": str(installed), "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(line, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=900, check=False)
+    assert done.returncode == 0, done.stdout[-5_000:]
+    passed = [name for name in done.stdout.splitlines() if " PASSED" in name]
+    for member in MEMBERS:
+        assert any(f"[{member}" in name or f"-{member}" in name for name in passed), f"nothing was asked of {member}"
+
+
+def test_everything_that_lists_members_holds_with_it(installed: Path) -> None:
+    line = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-q", *LISTINGS]
+    environment = {**os.environ, "PYTHONPATH": str(installed), "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(line, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=900, check=False)
+    assert done.returncode == 0, done.stdout[-5_000:]

@@ -89,6 +89,16 @@ class Method(ABC, Generic[ConfigType]):
         """Return settings that follow from the others of `config`, each with its source; by default none."""
         return {}
 
+    @classmethod
+    def small(cls) -> Mapping[str, Any]:
+        """Return settings with which a batch takes a fraction of a second, for tests; by default the defaults do."""
+        return {}
+
+    @property
+    def shortest_batch(self) -> int:
+        """Most environment steps that `train` takes when one is left: an episode, unless several must be compared."""
+        return self.problem.task.horizon + 1
+
     def use_cores(self, count: int) -> None:
         """Use up to `count` cores from now on; no number may depend on it. By default a method uses one."""
 

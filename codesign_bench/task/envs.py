@@ -58,6 +58,12 @@ def observation_space(task: Task) -> Box:
     return Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
 
 
+def _rendering(task: Task, rollouts: _Rollouts) -> dict[str, Any]:
+    """Return what an environment's metadata say of its pictures: those of a task that draws none offer no mode."""
+    modes = [RGB_ARRAY] if rollouts.episodes.simulator.draws else []
+    return {"render_modes": modes, "render_fps": round(1.0 / task.control_period)}
+
+
 class _Rollouts:
     """The episodes of `B` environments, each with its own generator of instances, that may be in different phases."""
 
@@ -136,8 +142,8 @@ class ToolEnv(gymnasium.Env[Any, Any]):
         self.observation_space = observation_space(self.task)
         self.action_space = action_space(self.task)
         self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.task.control_period)}
         self._rollouts = _Rollouts(self.task, 1, tradeoff)
+        self.metadata = {**self.metadata, **_rendering(self.task, self._rollouts)}
         self._slots: Slots = np.zeros(1, dtype=np.intp)
 
     def reset(
@@ -198,12 +204,12 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
         self.task = load_task(task_name)
         self.num_envs = num_envs
         self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.task.control_period)}
         self.single_observation_space = observation_space(self.task)
         self.single_action_space = action_space(self.task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._rollouts = _Rollouts(self.task, num_envs, tradeoff)
+        self.metadata = {**self.metadata, **_rendering(self.task, self._rollouts)}
         self._generators: list[np.random.Generator] = [seeding.np_random()[0] for _ in range(num_envs)]
 
     def reset(

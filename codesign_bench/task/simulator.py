@@ -146,6 +146,11 @@ class Simulator(ABC):
         """
         raise NotImplementedError
 
+    @property
+    def draws(self) -> bool:
+        """Whether the task draws pictures."""
+        return type(self).render is not Simulator.render
+
     def render(self, slot: int) -> Frame:
         """Return a picture of the scene in `slot`, (height, width, 3), in RGB; needs no display and changes nothing.
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import io
 import itertools
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import pytest
 
+from builders import offered
 from codesign_bench import load_task, task_names
 from codesign_bench.fabrication.export import SOLID_FORMATS, file_content
 from codesign_bench.fabrication.solids import Solid, handle_of, tool_solid, united
@@ -34,7 +36,7 @@ def engine_shapes(simulator: Simulator, task: Task, design: Floats) -> tuple[Too
     slot = np.array([0])
     simulator.begin(slot, task.evaluation_instances()[:1])
     simulator.build(slot, design[None])
-    return simulator.tool_shapes(0)
+    return offered(partial(simulator.tool_shapes, 0))
 
 
 def inside(parts: Sequence[ToolPart], points: Floats) -> np.ndarray:

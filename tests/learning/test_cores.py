@@ -52,13 +52,10 @@ def test_no_method_depends_on_the_cores(name: str) -> None:
     method_class = load_method(name)
     policies = []
     for cores in (1, 2):
-        config: Any = method_class.config_class()
-        for key, value in {"batch_size": 96, "popsize": 4, "episodes_per_candidate": 2}.items():
-            if hasattr(config, key):
-                config = type(config)(**{**vars(config), key: value})
+        config: Any = method_class.config_class(**method_class.small())
         method = method_class(Problem(load_task("toy_reach")), config, Streams(0))
         method.use_cores(cores)
-        method.train(96)
+        method.train(96)  # Five groups at least, where a method rolls out in groups.
         policies.append(method.policy().tensors())
     for key, array in policies[0].items():
         np.testing.assert_array_equal(array, policies[1][key], err_msg=key)

@@ -23,9 +23,9 @@ from codesign_bench.task import Singles, Task, task_names
 from codesign_bench.task.episodes import Episodes
 
 MakeMethod = Callable[..., Method[Any]]
-EVERY_METHOD = pytest.mark.parametrize("name", [*method_names(), "sac"])
-"""The built-in methods and the example package's off-policy one."""
+EVERY_METHOD = pytest.mark.parametrize("name", method_names())
 BUDGET = 10_000
+PATIENCE = 20
 
 
 def observations(task: Task, count: int = 6) -> tuple[Singles, Singles]:
@@ -58,13 +58,17 @@ def assert_same_state(first: Method[Any], second: Method[Any]) -> None:
 
 
 @EVERY_METHOD
-def test_a_batch_changes_the_policy(make_method: MakeMethod, name: str) -> None:
+def test_training_changes_the_policy(make_method: MakeMethod, name: str) -> None:
     method = make_method(name)
     before = method.policy().tensors()
-    report = method.train(BUDGET)
-    after = method.policy().tensors()
-    assert before.keys() == after.keys()
-    assert any(not np.array_equal(before[key], after[key]) for key in before)
+    for _ in range(PATIENCE):  # Some methods change it with every batch, some when they found a better one.
+        report = method.train(BUDGET)
+        after = method.policy().tensors()
+        assert before.keys() == after.keys()
+        if any(not np.array_equal(before[key], after[key]) for key in before):
+            break
+    else:
+        pytest.fail(f"{PATIENCE} batches changed nothing")
     assert report.metrics
     assert all(np.isfinite(value) for value in report.metrics.values())
 
@@ -182,11 +186,9 @@ def test_every_profile_makes_a_valid_configuration_for_every_task(name: str, pro
 
 
 @EVERY_METHOD
-def test_the_last_batch_of_a_small_budget_is_small(make_method: MakeMethod, name: str, push: Task) -> None:
-    method = make_method(name, episodes_per_candidate=3)
-    # Candidates that are compared on the same instances need an episode each; all else is one episode.
-    compared = "episodes_per_candidate" in {field.name for field in fields(method.config)}
-    assert method.train(1).env_steps <= (method.config.popsize if compared else 1) * (push.horizon + 1)
+def test_the_last_batch_of_a_small_budget_is_small(make_method: MakeMethod, name: str) -> None:
+    method = make_method(name)
+    assert 1 <= method.train(1).env_steps <= method.shortest_batch
 
 
 @EVERY_METHOD

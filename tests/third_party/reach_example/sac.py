@@ -158,6 +158,17 @@ class Sac(Method[Config]):
         """Play episodes in up to `count` processes."""
         self.collector.use_cores(count)
 
+    @classmethod
+    def small(cls) -> Mapping[str, Any]:
+        """Return batches of a few episodes and small networks."""
+        return {
+            "batch_size": 250,
+            "minibatch_size": 32,
+            "updates_per_step": 0.05,
+            "replay_size": 2_000,
+            "hidden": (16,),
+        }
+
     def train(self, remaining_steps: int) -> BatchReport:
         """Collect a batch of whole episodes, then update on minibatches of the replay buffer."""
         batch = self.collector.collect(_SquashedExplorer(self.actor), min(self.config.batch_size, remaining_steps))

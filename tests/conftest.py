@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -39,7 +40,7 @@ def parameters(item: pytest.Function) -> list[str]:
 def toy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make `toy_reach` and `toy_search` known here and in the processes started from here."""
     monkeypatch.syspath_prepend(str(TESTS))
-    monkeypatch.setenv("PYTHONPATH", str(TESTS))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(TESTS), os.environ.get("PYTHONPATH", "")]).strip(os.pathsep))
     monkeypatch.setenv(registry.IMPORTS_VARIABLE, "")
     monkeypatch.setattr(registry, "_registered", {})
     plugins.import_modules(["toy"])

@@ -18,7 +18,11 @@ from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.method import Problem
 from codesign_bench.seeding import Streams
 
-EXAMPLE = Path(__file__).parent / "third_party"
+TESTS = Path(__file__).parent
+EXAMPLE = TESTS / "third_party"
+MEMBERS = ("reach", "random_search", "sac", "tool_lengths", "fitting_lengths")
+LISTINGS = ("test_cli.py", "test_docs.py", "test_architecture.py", "study", "claims/test_verify.py")
+"""Tests of what shows or compares all members."""
 IMPORTS = tuple(f"--import=reach_example.{name}" for name in ("reach", "random_search", "sac"))
 SMALL_SAC = ("batch_size=250", "minibatch_size=32", "updates_per_step=0.05", "replay_size=2000")
 """Batches are short, and the replay buffer overflows."""
@@ -53,6 +57,15 @@ def command(*arguments: str, path: Path, status: int = 0) -> tuple[str, str]:
     output, errors = started.communicate(timeout=180)
     assert started.returncode == status, output + errors
     return output, errors
+
+
+def suite(*arguments: str, path: Path) -> str:
+    """Run tests of this suite with the package in the folder `path` installed, which must pass; return the output."""
+    line = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *arguments]
+    environment = {**os.environ, "PYTHONPATH": str(path), "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(line, cwd=TESTS.parent, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-10_000:]
+    return done.stdout
 
 
 def curve(folder: Path) -> pd.DataFrame:
@@ -164,22 +177,12 @@ def test_an_off_policy_learner_learns_to_reach(seed: int, monkeypatch: pytest.Mo
     assert start < 0.2 < 0.8 <= evaluate(method.problem.task, method.policy()).summary["success_rate"]
 
 
-MEMBERS = ("reach", "random_search", "sac", "tool_lengths", "fitting_lengths")
-
-
 def test_its_members_keep_every_promise_that_is_tested_of_members(installed: Path) -> None:
-    # All tests, of all that this suite asks of a task, a method, a figure or a study, with the package installed.
-    line = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-v", "--members", ",".join(MEMBERS)]
-    environment = {**os.environ, "PYTHONPATH": str(installed), "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(line, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=900, check=False)
-    assert done.returncode == 0, done.stdout[-5_000:]
-    passed = [name for name in done.stdout.splitlines() if " PASSED" in name]
+    told = suite("-v", "--members", ",".join(MEMBERS), path=installed)
+    passed = [line for line in told.splitlines() if " PASSED" in line]
     for member in MEMBERS:
         assert any(f"[{member}" in name or f"-{member}" in name for name in passed), f"nothing was asked of {member}"
 
 
 def test_everything_that_lists_members_holds_with_it(installed: Path) -> None:
-    line = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-q", *LISTINGS]
-    environment = {**os.environ, "PYTHONPATH": str(installed), "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(line, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=900, check=False)
-    assert done.returncode == 0, done.stdout[-5_000:]
+    suite("-q", *(str(TESTS / name) for name in LISTINGS), path=installed)

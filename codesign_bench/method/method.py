@@ -41,7 +41,7 @@ class State:
     large: dict[str, Array] = field(default_factory=dict)
     """Arrays that take long to write, such as a replay buffer, by name.
 
-    The runner streams them to a file of their own, and saves less often the longer that takes. They need not be copies:
+    The runner streams them to a separate file, and saves less often the longer that takes. They need not be copies:
     they are written before training continues, and `Method.load_state` may keep those that it is given.
     """
 

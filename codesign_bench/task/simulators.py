@@ -28,7 +28,7 @@ class Simulators:
     def lend(self, num_slots: int) -> Iterator[Simulator]:
         """Lend a simulator with at least `num_slots` slots, which must not be used after the `with` block.
 
-        A second loan within the first gets a simulator of its own.
+        A second loan within the first gets another simulator.
         """
         simulator = self._take(num_slots)
         yield simulator

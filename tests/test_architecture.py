@@ -163,6 +163,19 @@ def test_the_core_names_no_method_task_or_study() -> None:
     assert named == []
 
 
+def room_of(module: str) -> str:
+    """Return the package of the core that a module is in, or the module itself where it is in none."""
+    name = module.split(".")[1] if "." in module else module
+    return name if (ROOT / "codesign_bench" / name).is_dir() else module
+
+
+def test_no_room_of_the_core_needs_itself_through_others() -> None:
+    edges: dict[str, set[str]] = {}
+    for module, others in imports_between(CORE).items():
+        edges.setdefault(room_of(module), set()).update({room_of(other) for other in others} - {room_of(module)})
+    assert sorted(room for room in edges if room in reached(room, edges)) == []
+
+
 @pytest.mark.parametrize("heavy", ["torch", "pybullet", "pymunk", "cma", "pandas"])
 def test_listing_and_helping_import_nothing_heavy(heavy: str) -> None:
     call = "import sys; from codesign_bench.cli import main; main(['list']); main(['--help']); "

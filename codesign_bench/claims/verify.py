@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from rich.console import Console
 
@@ -20,12 +20,27 @@ from codesign_bench.console import Log, print_table, printer
 from codesign_bench.errors import UserError
 from codesign_bench.seeding import generator
 from codesign_bench.storage.files import write_bytes, write_json
-from codesign_bench.study.study import Study
 from codesign_bench.text_tables import markdown
 
 MARKDOWN_FILE, JSON_FILE = "claims.md", "claims.json"
 SEED = 0
 """Of the bootstrap; each claim has a stream of its own, so that a new claim never moves another's interval."""
+
+
+class Claimant(Protocol):
+    """What makes claims: a study."""
+
+    @property
+    def name(self) -> str:
+        """Its short name."""
+
+    @property
+    def title(self) -> str:
+        """Its name in headings."""
+
+    @property
+    def claims(self) -> Callable[[], Sequence[Claim]]:
+        """Makes its claims."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +85,7 @@ def _row(claim: Claim, evidence: Evidence, results: str) -> Row:
         return Row(claim, Finding(UNDECIDED, math.nan, note=str(lacking)), needs)
 
 
-def verify(study: Study, results: Path, out: Path, console: Console, *, measure: bool = False) -> None:
+def verify(study: Claimant, results: Path, out: Path, console: Console, *, measure: bool = False) -> None:
     """Judge the claims of a study on the results folder, print the table and write it into `out`.
 
     With `measure`, tools and policies are first played where claims need outcomes that no cell holds; it takes minutes.
@@ -126,7 +141,7 @@ def missing(rows: Sequence[Row]) -> list[str]:
     return list(dict.fromkeys(command for row in rows if row.asked for command in row.needs))
 
 
-def write_rows(rows: Sequence[Row], study: Study, results: Path, out: Path) -> list[Path]:
+def write_rows(rows: Sequence[Row], study: Claimant, results: Path, out: Path) -> list[Path]:
     """Write the rows as Markdown and JSON into `out` and return the paths.
 
     Raises:
@@ -142,7 +157,7 @@ def write_rows(rows: Sequence[Row], study: Study, results: Path, out: Path) -> l
     return paths
 
 
-def as_json(rows: Sequence[Row], study: Study, results: Path) -> dict[str, Any]:
+def as_json(rows: Sequence[Row], study: Claimant, results: Path) -> dict[str, Any]:
     """Return everything that is known of each claim, as JSON values; what is not finite is None or text."""
     return {
         "version": __version__,
@@ -171,7 +186,7 @@ def as_json(rows: Sequence[Row], study: Study, results: Path) -> dict[str, Any]:
     }
 
 
-def as_markdown(rows: Sequence[Row], study: Study, results: Path) -> str:
+def as_markdown(rows: Sequence[Row], study: Claimant, results: Path) -> str:
     """Return the page: the table of claims, the rules that judged them, and the commands for missing data."""
     asked = [row for row in rows if row.asked]
     header = ("claim", "verdict", "statistic [95 % interval]", "n", "rule", "source", "note")

@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Run, draw, verify and report; 1 if some cell failed."""
-    from codesign_bench.study.reproduce import reproduce
+    from codesign_bench.reproduce import reproduce
 
     profile_named(options.profile)  # refuses an unknown profile before anything runs
     check_at_least_one(options, "seeds", "jobs")

@@ -13,8 +13,8 @@ from codesign_bench.cell.variant import Variant
 from codesign_bench.cli import main
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
+from codesign_bench.reproduce import reproduce
 from codesign_bench.study import Experiment, Grid, Study
-from codesign_bench.study.reproduce import reproduce
 
 SMALL = ("steps=200", "evaluations=2", "fine_tuning_steps=100")
 DEFAULTS = Grid(("toy_reach",), ("toy_search",), (0, 1), overrides=SMALL)

@@ -40,6 +40,11 @@ def built_in(group: str) -> tuple[str, ...]:
     return _files(group)
 
 
+def presented(group: str) -> tuple[str, ...]:
+    """Return the built-in names of `group` that its folder's `ORDER` lists: those with a page in the documentation."""
+    return _order(group)
+
+
 def in_order(group: str, found: Iterable[str]) -> list[str]:
     """Return the `found` names of `group`, each once, in the order of listings; unknown ones last, by name."""
     present, known = set(found), names(group)
@@ -116,8 +121,13 @@ def single_subclass(module: ModuleType, base: type) -> Any:
 def _files(group: str) -> tuple[str, ...]:
     package = importlib.import_module(f"codesign_bench.{group}")
     found = [info.name for info in pkgutil.iter_modules(package.__path__) if not info.name.startswith("_")]
-    order: tuple[str, ...] = getattr(package, "ORDER", ())
+    order = _order(group)
     return tuple(sorted(found, key=lambda name: (order.index(name) if name in order else len(order), name)))
+
+
+def _order(group: str) -> tuple[str, ...]:
+    package = importlib.import_module(f"codesign_bench.{group}")
+    return tuple(getattr(package, "ORDER", ()))
 
 
 def _entry_points(group: str) -> dict[str, EntryPoint]:

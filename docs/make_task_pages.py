@@ -1,4 +1,4 @@
-"""Write the pages of the built-in tasks, docs/tasks/<task>.md, from the tasks themselves and from hand-written notes.
+"""Write the pages of the presented tasks, docs/tasks/<task>.md, from the tasks themselves and from hand-written notes.
 
     python docs/make_task_pages.py            write them
     python docs/make_task_pages.py --check    write nothing; fail if one of them is out of date
@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from codesign_bench.registry import names
+from codesign_bench.registry import presented
 from codesign_bench.task import Box, Layout, Task, load_task, simulator
 from codesign_bench.task.envs import environment_id
 
@@ -38,7 +38,7 @@ WIDTH = 120
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the pages, or check them; return the exit code."""
-    parser = argparse.ArgumentParser(description="Write the pages of the built-in tasks.")
+    parser = argparse.ArgumentParser(description="Write the pages of the presented tasks.")
     parser.add_argument("--check", action="store_true", help="write nothing; fail if a page is out of date")
     options = parser.parse_args(arguments)
     stale = [path for path, text in pages() if not path.exists() or path.read_text(encoding="utf-8") != text]
@@ -53,9 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def pages() -> Iterator[tuple[Path, str]]:
     """Yield the file and the text of each page."""
-    for name in names("tasks"):
-        if (ROOT / "tasks" / f"{name}.py").exists():
-            yield PAGES / f"{name}.md", page(load_task(name))
+    for name in presented("tasks"):
+        yield PAGES / f"{name}.md", page(load_task(name))
 
 
 def page(task: Task) -> str:

@@ -13,7 +13,7 @@ import pytest
 import codesign_bench
 from codesign_bench.config.resolve import resolve
 from codesign_bench.method import Problem, load_method
-from codesign_bench.registry import built_in
+from codesign_bench.registry import presented
 from codesign_bench.seeding import Streams
 from codesign_bench.task import load_task, task_names
 from codesign_bench.task.episodes import Tradeoff
@@ -40,9 +40,10 @@ def test_links_lead_to_files(page: Path) -> None:
 
 
 @pytest.mark.parametrize("folder", ["tasks", "methods"])
-def test_every_entry_has_a_page_that_the_index_names(folder: str) -> None:
+def test_every_presented_member_has_a_page_that_the_index_names(folder: str) -> None:
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
-    names = sorted(path.stem for path in (ROOT / folder).glob("[a-z]*.py"))
+    names = presented(folder)
+    assert names
     assert [name for name in names if not (ROOT / "docs" / folder / f"{name}.md").exists()] == []
     assert [name for name in names if f"({folder}/{name}.md)" not in index] == []
 
@@ -78,7 +79,7 @@ def test_a_row_explains_what_it_names_and_nothing_else() -> None:
     assert unexplained(["kl", "reward_progress", "reward_", "reward", "kl_2"], page) == ["reward_", "reward", "kl_2"]
 
 
-@pytest.mark.parametrize("name", built_in("methods"))
+@pytest.mark.parametrize("name", presented("methods"))
 def test_every_logged_value_is_explained_on_the_methods_page(name: str) -> None:
     method_class, task_name = load_method(name), task_names()[0]
     config = resolve(method_class, task_name, "quick").method

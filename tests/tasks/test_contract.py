@@ -17,7 +17,7 @@ from scipy import stats
 from builders import offered
 from codesign_bench.errors import UserError
 from codesign_bench.method import Problem
-from codesign_bench.registry import built_in
+from codesign_bench.registry import presented
 from codesign_bench.task import Booleans, Floats, Singles, Task, load_task, task_names
 from codesign_bench.task.behaviours import RandomBehaviour
 from codesign_bench.task.episodes import TRADEOFF_TERM, Episodes, Tradeoff
@@ -342,8 +342,8 @@ def test_a_tool_is_made_of_parts_that_its_design_changes(task: Task) -> None:
     assert len({type(part) for part in first}) == 1
 
 
-@pytest.mark.parametrize("name", built_in("tasks"))
-def test_a_built_in_task_does_without_nothing(name: str) -> None:
+@pytest.mark.parametrize("name", presented("tasks"))
+def test_a_presented_task_does_without_nothing(name: str) -> None:
     task = load_task(name)
     episodes, slots = Episodes(task, 1), np.arange(1)
     episodes.begin(slots, task.evaluation_instances()[:1])

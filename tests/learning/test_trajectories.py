@@ -55,7 +55,9 @@ def test_joined_groups_keep_their_slots_in_order_and_pad_with_steps_that_are_not
 ) -> None:
     learner = make_learner()
     short, long = learner.collect(20, 2), learner.collect(60, 3)
-    short.reward_terms["progress"], long.reward_terms["progress"] = 1.0, 2.0
+    for group, progress in ((short, 1.0), (long, 2.0)):
+        group.reward_terms.clear()
+        group.reward_terms["progress"] = progress
     batch = joined([short, long])
     assert batch.env_steps == short.env_steps + long.env_steps
     assert not batch.valid[:2, short.valid.shape[1] :].any()

@@ -33,8 +33,12 @@ SMALL: dict[str, Any] = {
     "value_mlp": (16,),
     "hidden": (16,),
     "replay_size": 1_000,
+    "updates_per_step": 0.02,
 }
-"""What is set in a configuration that has the field, for batches of a few episodes with small networks."""
+"""What is set in a configuration that has the field, for batches of a few episodes with small networks.
+
+Updates are so few that weights stay about as they start.
+"""
 
 
 def small_config(method_class: type[Method[Any]], **changes: Any) -> Any:

@@ -15,13 +15,14 @@ def compute_in_double(monkeypatch: pytest.MonkeyPatch, learner: TwoPhaseLearner)
     The code is the same in either precision: what is wrong in one is wrong in the other. Here it stands out, since
     rounding is a thousand million times smaller.
     """
-    tensor = learner._tensor
+    compute = learner.compute
+    tensor = compute.tensor
 
     def widened(array: np.ndarray) -> Tensor:
         made = tensor(array)
         return made.double() if made.is_floating_point() else made
 
-    monkeypatch.setattr(learner, "_tensor", widened)
+    monkeypatch.setattr(compute, "tensor", widened)
     monkeypatch.setattr(Tensor, "float", Tensor.double)
     for module in learner.modules().values():
         module.double()

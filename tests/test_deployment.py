@@ -76,6 +76,7 @@ def test_the_protocol_has_five_trials_of_each_tool_and_twelve_starts() -> None:
     assert list(grid_trials(deployment_of(load_task("lift_cup")).trials, (1, 2))) == []
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("name", TASKS)
 def test_with_the_ideal_arm_and_nothing_changed_deployment_is_the_task_itself(name: str) -> None:
     task = load_task(name)
@@ -87,6 +88,7 @@ def test_with_the_ideal_arm_and_nothing_changed_deployment_is_the_task_itself(na
     assert rollout.outcome == expected.outcomes[0], "to the last bit: the physics are the same"
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("name", TASKS)
 def test_a_tool_works_on_the_panda_as_it_does_on_the_gantry(name: str) -> None:
     instance = deployment_of(load_task(name)).trials.own[3]

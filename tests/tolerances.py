@@ -43,6 +43,16 @@ def of_network(widths: Sequence[int], largest: float = 1.0, unit: float = SINGLE
     return 6.0 * (2.0 * roundings) ** 0.5 * largest * unit
 
 
+def of_log_prob(entries: int, away: float, std: float, error: float, unit: float = SINGLE) -> float:
+    """Return how far two Gaussian log-probabilities of the same action of `entries` numbers may lie apart.
+
+    Each number counts by half the square of its distance from the mean, at most `away` standard deviations: an error of
+    the mean or of the action, `error`, counts so many times, in units of the smallest deviation, `std`. Beside that, a
+    quotient, a square, a product, a logarithm of at most 4 and a constant are rounded for each number.
+    """
+    return entries * away * error / std + of_sum(5 * entries, entries * (away**2 + 5.0), unit)
+
+
 ADAM_SLOPE = 5.0
 """Adam's step, learning rate * m / (sqrt(v) + epsilon), changes by at most this times learning rate / epsilon times a
 change of the gradient: by one through m, as m is a mean of gradients, and by |m| / sqrt(v) through v, which is at most

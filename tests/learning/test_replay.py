@@ -31,7 +31,7 @@ def test_transitions_are_the_valid_steps_of_a_batch(make_learner: Callable[..., 
     assert len(found) == batch.env_steps
     np.testing.assert_array_equal(found.is_design, batch.is_design[batch.valid])
     np.testing.assert_array_equal(found.next_observation, batch.next_observation[batch.valid])
-    np.testing.assert_allclose(found.reward, batch.reward[batch.valid], rtol=1e-6)
+    np.testing.assert_array_equal(found.reward, np.float32(batch.reward[batch.valid]))
     assert not found.control[found.is_design].any()
     assert not found.design[~found.is_design].any()
 

@@ -11,7 +11,6 @@ import sys
 from itertools import groupby
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
@@ -27,6 +26,7 @@ from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.storage.cells import StoredCell, find_cells
 from codesign_bench.storage.layout import EVALUATION_FILE, POLICY_FILE
 from codesign_bench.storage.policies import policy_and_task
+from played_alike import assert_played_alike
 
 REFERENCE = Path(__file__).resolve().parents[2] / "results" / "reference"
 
@@ -89,18 +89,11 @@ def test_the_folder_stays_small() -> None:
     assert sum(path.stat().st_size for path in REFERENCE.rglob("*") if path.is_file()) < 60e6
 
 
-OTHERWISE = 8
-"""At most so many of a policy's 128 episodes may end otherwise on another machine.
-
-Of 30 policies' 3,840 episodes, 4 did on another maker's processor, and up to 5 under other instruction sets; never
-more than 3 of one policy's. With a mean of 2, more than 8 come once in 4,000 times.
-"""
-ALIKE = 1e-4
-"""Half of a policy's episodes get the same return, to this share of it or of one.
-
-Rounding changes actions by some 1e-6, and only some contacts make much more of that.
-"""
-ONE_PER_TASK = [next(group) for _, group in groupby(PLAYABLE, lambda cell: cell.record.task)]
+ONE_PER_TASK = [
+    max(group, key=lambda cell: cell.record.method == "gnn_ppo")
+    for _, group in groupby(PLAYABLE, lambda cell: cell.record.task)
+]
+"""Of each task, one policy, with networks if there is one: CMA-ES's plans need none, which leaves less to round."""
 
 
 @pytest.mark.parametrize(
@@ -109,14 +102,8 @@ ONE_PER_TASK = [next(group) for _, group in groupby(PLAYABLE, lambda cell: cell.
     ids=name_of,
 )
 def test_a_shipped_policy_gets_the_shipped_returns(cell: StoredCell) -> None:
-    shipped = pd.read_csv(cell.folder / EVALUATION_FILE)
     evaluation = evaluate(cb.load_task(cell.record.task), cb.load_policy(cell.folder))
-    value = shipped["return"].to_numpy()
-    assert np.median(np.abs(evaluation.returns - value) / np.maximum(1.0, np.abs(value))) < ALIKE
-    assert (evaluation.successes != shipped["success"]).sum() <= OTHERWISE
-    # Whatever an episode comes to, it hardly leaves the range of the others.
-    share = OTHERWISE / len(value)
-    assert evaluation.returns.mean() == pytest.approx(value.mean(), abs=share * np.ptp(value) + ALIKE)
+    assert_played_alike(evaluation, pd.read_csv(cell.folder / EVALUATION_FILE))
 
 
 def test_the_evaluation_of_a_shipped_cell_is_the_end_of_its_curve() -> None:

@@ -93,6 +93,7 @@ def test_the_design_step_ignores_the_control_part_and_the_other_way_round(task_n
     np.testing.assert_array_equal(rollouts[0], rollouts[1])
 
 
+@pytest.mark.numeric
 @EVERY_TASK
 def test_every_environment_of_a_batch_goes_as_it_does_alone(task_name: str) -> None:
     count, length = 3, load_task(task_name).horizon + 20

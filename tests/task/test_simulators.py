@@ -60,6 +60,7 @@ def random_behaviour(task: Task, seed: int) -> RandomBehaviour:
     return RandomBehaviour(task, np.random.default_rng(seed))
 
 
+@pytest.mark.numeric
 @pytest.mark.parametrize("name", task_names())
 def test_what_was_played_before_changes_no_evaluation(name: str) -> None:
     task, simulators = load_task(name), Simulators(load_task(name))

@@ -36,6 +36,7 @@ def test_worlds_are_made_when_used_and_handed_on() -> None:
     assert not set(second.worlds) & set(third.worlds), "a world belongs to one simulator"
 
 
+@pytest.mark.numeric
 def test_rotations_by_hand() -> None:
     quarter = bullet.rotations_about(2, np.array([0.5 * np.pi]))
     np.testing.assert_allclose(quarter, [[0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]])

@@ -6,6 +6,9 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
+import pytest
+
+pytestmark = pytest.mark.numeric
 
 planar: Any = import_module("codesign_bench.tasks._planar")
 QUARTER = np.pi / 2.0

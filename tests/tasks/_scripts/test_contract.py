@@ -14,6 +14,8 @@ from codesign_bench.task import Behaviour, Task, load_task, task_names
 from codesign_bench.task.behaviours import GivenDesigns
 from codesign_bench.task.episodes import Episodes
 
+pytestmark = pytest.mark.numeric
+
 EPISODES = 12
 
 

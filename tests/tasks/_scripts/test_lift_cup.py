@@ -5,10 +5,13 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
+import pytest
 
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.task import load_task
 from codesign_bench.task.behaviours import GivenDesigns
+
+pytestmark = pytest.mark.numeric
 
 
 def test_it_lifts_cups_of_every_corner_and_random_tools_do_so_rarely() -> None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.registry import load_module
 from codesign_bench.task import load_task
 from codesign_bench.task.behaviours import GivenDesigns
+
+pytestmark = pytest.mark.numeric
 
 scoop: Any = load_module("tasks", "scoop")
 

@@ -6,11 +6,14 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
+import pytest
 
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.registry import load_module
 from codesign_bench.task import load_task
 from codesign_bench.task.behaviours import GivenDesigns
+
+pytestmark = pytest.mark.numeric
 
 scoop: Any = load_module("tasks", "scoop_3d")
 script: Any = import_module("codesign_bench.tasks._scripts.scoop_3d")

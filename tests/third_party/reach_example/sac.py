@@ -164,7 +164,7 @@ class Sac(Method[Config]):
         return {
             "batch_size": 250,
             "minibatch_size": 32,
-            "updates_per_step": 0.05,
+            "updates_per_step": 0.02,
             "replay_size": 2_000,
             "hidden": (16,),
         }

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from codesign_bench.storage.policies import load_policy
     from codesign_bench.task import load_task, task_names
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "UserError": "errors",

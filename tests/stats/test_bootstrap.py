@@ -142,9 +142,9 @@ def test_nothing_is_said_where_a_method_has_no_score() -> None:
     assert np.isnan(stats.performance_profile([[1.0], []], [0.0, 1.0])).all()
 
 
-# What rliable says of the same scores (how they were made: data/measure_rliable.py) -----------------------------------
+# What rliable says of the same scores (how they were made: tests/data/measure_rliable.py) -----------------------------
 
-RLIABLE = json.loads((Path(__file__).parent / "data" / "rliable.json").read_text())
+RLIABLE = json.loads((Path(__file__).parents[1] / "data" / "rliable.json").read_text())
 FIRST, SECOND = np.array(RLIABLE["first"]).T, np.array(RLIABLE["second"]).T
 """Scores of two methods, (tasks, runs)."""
 DRAWN = 0.02

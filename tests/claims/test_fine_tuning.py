@@ -14,11 +14,7 @@ from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, La
 from evidence import OURS, TASK, curves, finals, found
 
 WINS = fine_tuning.fine_tuning_wins(TASK, OURS, 2, ())
-
-
 BEFORE = fine_tuning.unsolved_before(TASK, OURS, 2, ())
-
-
 AFTER = fine_tuning.solved_after(TASK, OURS, 2, ())
 
 

@@ -15,8 +15,6 @@ from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, La
 from evidence import OURS, TASK, cells, found
 
 VARY = tools.tools_vary(TASK, OURS, 6)
-
-
 WIDTHS: Mapping[str, Mapping[str, float]] = {TASK: {"design_length": 2.0, "design_angle": 4.0, "design_fixed": 0.0}}
 
 

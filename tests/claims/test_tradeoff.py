@@ -14,14 +14,8 @@ from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, La
 from evidence import OURS, TASK, cells, found
 
 ALPHAS = (0.0, 0.3, 0.7)
-
-
 RATIO_FALLS = tradeoff.falls_with_alpha(TASK, OURS, ALPHAS, tradeoff.RATIO, "")
-
-
 EFFORT_RISES = tradeoff.rises_with_alpha(TASK, OURS, ALPHAS, tradeoff.EFFORT, "")
-
-
 IN_ORDER = tradeoff.ratio_in_order(TASK, OURS, ALPHAS, "")
 
 

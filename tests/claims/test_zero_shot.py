@@ -15,17 +15,9 @@ from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, La
 from evidence import OURS, TASK, cells, found
 
 FRACTIONS = (0.1, 0.4, 0.9)
-
-
 CLOSE = zero_shot.unseen_close(TASK, OURS, 0.1, "")
-
-
 FALLS = zero_shot.unseen_falls(TASK, OURS, FRACTIONS, "")
-
-
 GENTLY = zero_shot.unseen_falls_gently(TASK, OURS, FRACTIONS, "")
-
-
 PORTION = zero_shot.unseen_solved(TASK, OURS, 0.9, "")
 
 

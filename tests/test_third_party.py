@@ -21,7 +21,7 @@ from codesign_bench.seeding import Streams
 TESTS = Path(__file__).parent
 EXAMPLE = TESTS / "third_party"
 MEMBERS = ("reach", "random_search", "sac", "tool_lengths", "fitting_lengths")
-LISTINGS = ("test_cli.py", "test_docs.py", "test_architecture.py", "study", "claims/test_verify.py")
+LISTINGS = ("cli", "docs/test_pages.py", "test_architecture.py", "study", "claims/test_verify.py")
 """Tests of what shows or compares all members."""
 IMPORTS = tuple(f"--import=reach_example.{name}" for name in ("reach", "random_search", "sac"))
 SMALL_SAC = ("batch_size=250", "minibatch_size=32", "updates_per_step=0.05", "replay_size=2000")

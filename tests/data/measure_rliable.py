@@ -1,4 +1,4 @@
-"""Record what rliable says of the scores in `rliable.json`; `tests/test_stats.py` compares our statistics with it.
+"""Record what rliable says of the scores in `rliable.json`; `tests/stats` compares our statistics with it.
 
 rliable 1.2.0 does not import beside pandas 3, so it runs in an environment of its own:
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from PIL import Image
 
 from builders import VERSION_0_1_0
 from codesign_bench import load_task, task_names
@@ -30,21 +29,6 @@ def sheet(folder: Path) -> dict:
     """Return the one sheet in a folder."""
     (path,) = folder.glob("*.json")
     return dict(json.loads(path.read_text()))
-
-
-def test_a_start_with_a_minus_sign_is_no_option(tmp_path: Path) -> None:
-    assert main(["export", "--policy", str(FETCH), "--start", "-0.2,0.7", "--out", str(tmp_path)]) == 0
-    values = sheet(tmp_path)
-    assert values["instances"] == {"start--0.2_0.7": {"cube_start_x": -0.2, "cube_start_y": 0.7}}
-    assert values["handle"] == "the gripper's, added"
-    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".csv", ".json", ".obj", ".png", ".stl"]
-    (stl,) = tmp_path.glob("*.stl")
-    mesh = trimesh.load_mesh(stl)
-    assert mesh.is_volume
-    assert mesh.volume == pytest.approx(values["volume_mm3"], rel=1e-4)
-    assert mesh.extents == pytest.approx(values["bounding_box_mm"], rel=1e-4)
-    (png,) = tmp_path.glob("*.png")
-    assert np.asarray(Image.open(png).convert("L")).std() > 10.0, "something is drawn"
 
 
 def test_the_tool_is_the_one_that_evaluation_used(tmp_path: Path) -> None:
@@ -81,37 +65,6 @@ def test_a_goal_stands_in_its_instance(name: str) -> None:
     order = Order.of(task, goal=",".join(repr(float(value)) for value in goal))
     assert order.instances[0, : task.goal_size].tolist() == goal.tolist()
     evaluate(task, RandomBehaviour(task, np.random.default_rng(0)), instances=order.instances)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["--start", "1,2"], "--start: no object of task 'push' has one"),
-        (["--goal", "1"], "goal_x (11 to 21 m), goal_y"),
-        (["--goal", "a,b"], "give a number for each"),
-        (["--instances", "128"], "from 0 to 127, or all"),
-        (["--instances", "first"], "from 0 to 127, or all"),
-        (["--instances", "0", "--scale", "0"], "--scale must be positive"),
-        (["--instances", "0", "--task", "scoop"], "trained on 'push', not on 'scoop'"),
-    ],
-)
-def test_bad_input_gets_one_line(
-    arguments: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["export", "--policy", str(PUSH), *arguments, "--out", str(tmp_path / "out")]) == 2
-    message = capsys.readouterr().err
-    assert told in message
-    assert len(message.strip().splitlines()) == 1
-    assert not (tmp_path / "out").exists()
-
-
-def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    order = ["export", "--policy", str(PUSH), "--instances", "0", "--out", str(tmp_path)]
-    assert main(order) == 0
-    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    assert main(order) == 2
-    assert "is there already; choose another folder" in capsys.readouterr().err
-    assert before == {path: path.read_bytes() for path in tmp_path.iterdir()}
 
 
 def test_without_the_extra_the_way_to_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from codesign_bench.seeding import Streams
 from codesign_bench.task import load_task, task_names
 from codesign_bench.task.episodes import Tradeoff
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
 EXAMPLE = ROOT / "tests" / "third_party"
 

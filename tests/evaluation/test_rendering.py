@@ -1,4 +1,4 @@
-"""`codesign-bench render`: animations and pictures of scripts, random behaviour and trained policies."""
+"""Animations and pictures of scripts, random behaviour and trained policies."""
 
 from __future__ import annotations
 
@@ -68,31 +68,6 @@ def test_a_trained_policy_knows_its_task(tmp_path: Path, capsys: pytest.CaptureF
     assert path.exists()
     assert main(["render", "--policy", str(TRAINED), "--task", "scoop", "--out", str(path)]) == 2
     assert "trained on 'push', not on 'scoop'" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--task", "push", "--out", "push.jpg"], "pictures end in .gif or .png"),
-        (["--task", "pusch", "--out", "push.png"], "unknown task 'pusch'; choose from: push"),
-        (["--out", "push.png"], "give --task, or --policy"),
-        (["--policy", "x", "--behaviour", "random", "--out", "push.png"], "either --policy or --behaviour"),
-        (["--task", "push", "--episodes", "0", "--out", "push.png"], "--episodes must be at least 1"),
-        (["--policy", "nowhere", "--out", "push.png"], "is not a cell folder"),
-        (["--task", "push", "--out", "/proc/push.png"], "cannot write there"),
-    ],
-)
-def test_bad_input_gets_one_line(capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:
-    assert main(["render", *arguments]) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1
-
-
-@pytest.mark.parametrize("command", [["render", "--out", "push.png"], ["deploy", "--policy", "x"]])
-def test_a_seed_below_zero_is_refused(capsys: pytest.CaptureFixture[str], command: list[str]) -> None:
-    assert main([*command, "--seed", "-1"]) == 2
-    assert "argument --seed: a seed must be at least 0, not -1" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("toy")

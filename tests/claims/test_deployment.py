@@ -1,4 +1,4 @@
-"""The rules about deployed tools give each verdict where they should."""
+"""Rules about deployed tools give each verdict where they should."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 
 from codesign_bench.claims import deployment
-from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, Lacking
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Lacking
+from evidence import found
 
 OWN = deployment.own_instance_solved("fetch_cube", "gnn_ppo", tools=4, trials=5)
 GRID = deployment.no_tool_solves_the_grid("fetch_cube", "gnn_ppo", tools=4, starts=12)
@@ -36,11 +36,6 @@ def grid(*solved: Sequence[int]) -> Evidence:
         for number, (row, column) in enumerate(np.ndindex(3, 4))
     ]
     return Evidence(deployment=pd.DataFrame(rows))
-
-
-def found(rule: Rule, evidence: Evidence) -> Finding:
-    """Return what a rule finds."""
-    return rule.judge(evidence, np.random.default_rng(0))
 
 
 def test_every_tool_must_succeed_in_most_of_its_trials() -> None:

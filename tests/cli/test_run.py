@@ -1,0 +1,61 @@
+"""`codesign-bench run`: what it refuses, and what its options mean."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from codesign_bench.cli import main
+from codesign_bench.cli.program import build_parser
+from codesign_bench.cli.run import overrides
+
+pytestmark = pytest.mark.usefixtures("toy")
+
+RUN = ("run", "--method", "toy_search", "--task", "toy_reach", "--steps", "100", "--set", "evaluations=2")
+
+
+def test_a_foreign_or_unwritable_folder_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "thesis.tex").write_text("")
+    assert main([*RUN, "--out", str(tmp_path)]) == 2
+    assert main([*RUN, "--out", str(tmp_path / "thesis.tex")]) == 2
+    assert main([*RUN, "--out", "/proc/runs"]) == 2
+    told = capsys.readouterr().err.strip().splitlines()
+    assert len(told) <= 6
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_truncated_checkpoint_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*RUN, "fail_at=50", "--out", str(tmp_path)]) == 1
+    checkpoint = next(tmp_path.glob("*/*/*/*/checkpoint.safetensors"))
+    checkpoint.write_bytes(checkpoint.read_bytes()[:40])
+    capsys.readouterr()
+    assert main([*RUN, "fail_at=50", "--retry-failed", "--out", str(tmp_path)]) == 2
+    told = capsys.readouterr().err.strip()
+    assert str(checkpoint) in told
+    assert told.count("\n") <= 1
+
+
+def test_another_configuration_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*RUN, "--out", str(tmp_path)]) == 0
+    assert main([*RUN, "episodes=9", "--out", str(tmp_path)]) == 2
+    assert "episodes: stored 4, requested 9" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "has_bfloat16", "expected"),
+    [
+        (["--method", "gnn_ppo"], True, []),
+        (["--method", "gnn_ppo", "--precision", "fp32"], True, ["precision=fp32"]),
+        (["--method", "gnn_ppo", "--precision", "auto"], True, ["precision=bf16"]),
+        (["--method", "gnn_ppo", "--precision", "auto"], False, ["precision=fp32"]),
+        (["--method", "cma_es", "--precision", "auto"], True, []),
+        (["--method", "gnn_ppo", "--device", "cpu", "--set", "epochs=2"], True, ["epochs=2", "device=cpu"]),
+    ],
+)
+def test_device_and_precision_are_part_of_the_configuration(
+    monkeypatch: pytest.MonkeyPatch, arguments: list[str], has_bfloat16: bool, expected: list[str]
+) -> None:
+    monkeypatch.setattr("codesign_bench.machine.computes_in_bfloat16", lambda: has_bfloat16)
+    options = build_parser().parse_args(["run", "--task", "push", *arguments])
+    assert overrides(options) == expected

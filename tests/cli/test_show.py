@@ -1,0 +1,26 @@
+"""`codesign-bench show` tells the source of every value."""
+
+from __future__ import annotations
+
+import pytest
+
+from codesign_bench import method_names, task_names
+from codesign_bench.cli import main
+
+pytestmark = pytest.mark.usefixtures("toy")
+
+
+def test_show_tells_the_source_of_every_value(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["show", "--method", "toy_search", "--task", "toy_reach", "--profile", "paper", "--set", "widths=1,2"]
+    assert main(arguments) == 0
+    rows = {line.split()[1]: line for line in capsys.readouterr().out.splitlines()}
+    assert rows["widths"].split(maxsplit=4)[2:] == ["[1,", "2]", "--set"]
+    assert rows["step_size"].endswith("toy paper, table 1")
+    assert rows["episodes"].endswith("toy paper, table 2")
+    assert rows["steps"].endswith("paper, learning curves")
+
+
+def test_every_built_in_method_can_be_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    for method in method_names():
+        assert main(["show", "--method", method, "--task", task_names()[0], "--profile", "paper"]) == 0
+    assert "paper" in capsys.readouterr().out

@@ -12,7 +12,7 @@ import pytest
 from codesign_bench.claims import comparison, fine_tuning, tools, tradeoff, zero_shot
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, Finding, Lacking, above, below
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, Finding, InsufficientData, above, below
 
 TASK, OURS, OTHER = "push", "gnn_ppo", "cma_rl"
 
@@ -147,16 +147,16 @@ def test_steps_lie_on_the_line_between_two_evaluations() -> None:
 
 @pytest.mark.parametrize("rule", [HIGHER, FEWER])
 def test_unequal_budgets_are_not_compared(rule: Rule) -> None:
-    with pytest.raises(Lacking, match="budgets differ on push: 100 and 200 environment steps"):
+    with pytest.raises(InsufficientData, match="budgets differ on push: 100 and 200 environment steps"):
         found(rule, two_methods((1.0, 1.0, 1.0), (0.0, 0.0, 0.0), budget=200))
     assert found(rule, two_methods((1.0, 1.0, 1.0), (0.1, 0.1, 0.1), budget=109)).verdict == SUPPORTED
 
 
 @pytest.mark.parametrize("rule", [HIGHER, FEWER])
 def test_two_seeds_are_not_enough(rule: Rule) -> None:
-    with pytest.raises(Lacking, match="2 finished seeds of push/cma_rl/default; 3 are needed"):
+    with pytest.raises(InsufficientData, match="2 finished seeds of push/cma_rl/default; 3 are needed"):
         found(rule, two_methods((1.0, 1.0, 1.0), (0.0, 0.0)))
-    with pytest.raises(Lacking, match="0 finished seeds of push/gnn_ppo/default"):
+    with pytest.raises(InsufficientData, match="0 finished seeds of push/gnn_ppo/default"):
         found(rule, Evidence())
 
 
@@ -194,7 +194,7 @@ def test_losing_on_all_tasks_contradicts() -> None:
 
 
 def test_a_claim_about_all_tasks_needs_all_tasks() -> None:
-    with pytest.raises(Lacking, match="scoop"):
+    with pytest.raises(InsufficientData, match="scoop"):
         found(ACROSS, two_methods((1.0, 1.2, 1.4), (0.5, 0.6, 0.7)))
 
 
@@ -245,7 +245,7 @@ def test_parameters_count_in_widths_of_their_ranges() -> None:
 
 
 def test_a_task_that_is_not_known_is_lacking() -> None:
-    with pytest.raises(Lacking, match="'push' is not known"):
+    with pytest.raises(InsufficientData, match="'push' is not known"):
         found(VARY, Evidence(evaluations=designs([(0.0,)] * 3).evaluations))
 
 
@@ -275,11 +275,11 @@ def test_a_tool_that_solves_all_that_can_be_solved_contradicts() -> None:
 
 
 def test_few_tools_or_goals_say_nothing_of_tools_at_large() -> None:
-    with pytest.raises(Lacking, match="4 tools and 2 goals"):
+    with pytest.raises(InsufficientData, match="4 tools and 2 goals"):
         found(NO_SINGLE, tried([(1, 0), (0, 1)], copies=2))
-    with pytest.raises(Lacking, match="50 tools and 1 goals"):
+    with pytest.raises(InsufficientData, match="50 tools and 1 goals"):
         found(NO_SINGLE, tried([(1, 0), (0, 0)]))
-    with pytest.raises(Lacking, match="not measured"):
+    with pytest.raises(InsufficientData, match="not measured"):
         found(NO_SINGLE, Evidence())
 
 
@@ -326,15 +326,15 @@ def test_unseen_instances_are_close_if_they_keep_nine_tenths(
 
 
 def test_a_policy_that_learned_nothing_is_nothing_to_compare_with() -> None:
-    with pytest.raises(Lacking, match="nothing was learned"):
+    with pytest.raises(InsufficientData, match="nothing was learned"):
         found(CLOSE, cutouts({0.1: (1.0, 1.0, 1.0)}, seen=-0.1))
 
 
 def test_a_cutout_without_instances_is_lacking() -> None:
     evidence = cutouts({0.1: (1.0, 1.0, 1.0)})
-    with pytest.raises(Lacking, match="no instances both in and outside"):
+    with pytest.raises(InsufficientData, match="no instances both in and outside"):
         found(CLOSE, Evidence(evaluations=evidence.evaluations.assign(in_cutout=0.0)))
-    with pytest.raises(Lacking, match=r"cutout-0\.10"):
+    with pytest.raises(InsufficientData, match=r"cutout-0\.10"):
         found(CLOSE, Evidence(evaluations=evidence.evaluations.drop(columns="in_cutout")))
 
 
@@ -371,7 +371,7 @@ def test_a_gentle_fall_loses_less_than_half_at_a_step(last: Sequence[float], ver
 
 @pytest.mark.parametrize("rule", [FALLS, GENTLY])
 def test_a_trend_needs_three_fractions(rule: Rule) -> None:
-    with pytest.raises(Lacking, match=r"2 finished seeds of push/gnn_ppo/cutout-0.40"):
+    with pytest.raises(InsufficientData, match=r"2 finished seeds of push/gnn_ppo/cutout-0.40"):
         found(rule, cutouts({0.1: (9.0, 9.0, 9.0), 0.4: (8.0, 8.0), 0.9: (7.0, 7.0, 7.0)}))
 
 
@@ -403,9 +403,9 @@ def test_instances_outside_the_region_are_solved_by_more_than_half(
     rule = zero_shot.outside_solved(TASK, OURS, "")
     finding = found(rule, Evidence(outside=cells(OURS, **columns)))
     assert (finding.verdict, finding.value, finding.n) == (verdict, pytest.approx(rate), "3 seeds, 2 instances")
-    with pytest.raises(Lacking, match="0 seeds of push/gnn_ppo measured outside"):
+    with pytest.raises(InsufficientData, match="0 seeds of push/gnn_ppo measured outside"):
         found(rule, Evidence())
-    with pytest.raises(Lacking, match="2 seeds"):
+    with pytest.raises(InsufficientData, match="2 seeds"):
         found(rule, Evidence(outside=cells(OURS, **columns).query("seed < 2")))
 
 
@@ -457,7 +457,7 @@ def test_the_mean_along_a_curve_weighs_unequal_steps() -> None:
 
 def test_fine_tuning_needs_learning_from_scratch_to_compare_with() -> None:
     evidence = one_instance([QUICK] * 3, [SLOW] * 2)
-    with pytest.raises(Lacking, match="2 finished seeds of push/gnn_ppo/scratch-2"):
+    with pytest.raises(InsufficientData, match="2 finished seeds of push/gnn_ppo/scratch-2"):
         found(WINS, evidence)
 
 
@@ -541,7 +541,7 @@ def test_in_order_asks_every_step_to_go_down(values: Sequence[Sequence[float]], 
 def test_a_seed_that_never_moves_has_no_ratio() -> None:
     still = traded(dict(zip(ALPHAS, (HIGH, MIDDLE, LOW), strict=True)), effort=0.0)
     for rule in (RATIO_FALLS, IN_ORDER):
-        with pytest.raises(Lacking, match="never moves"):
+        with pytest.raises(InsufficientData, match="never moves"):
             found(rule, still)
 
 

@@ -1,6 +1,6 @@
 """codesign-bench: which way of learning a tool's design together with its control works best, and how sure are we?
 
-Importing it imports no method, no simulator and no torch; names are resolved when they are used.
+Importing the package imports no method, no simulator and no torch; its names are resolved on first use.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`python -m codesign_bench` is `codesign-bench`."""
+"""Make `python -m codesign_bench` the same as `codesign-bench`."""
 
 import sys
 

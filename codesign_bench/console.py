@@ -1,4 +1,4 @@
-"""What the user reads: lines, tables, and numbers in them."""
+"""Console output: lines, tables and the numbers in them."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from rich.console import Console
 from rich.table import Table
 
 Log: TypeAlias = Callable[[str], None]
-"""Shows the user a line."""
+"""A function that shows the user one line."""
 
 
 def printer(console: Console) -> Log:
-    """Return a function that prints a line as it is: no markup, no colours, nothing cut off."""
+    """Return a function that prints a line verbatim: no markup, no colours, no truncation."""
 
     def log(line: str) -> None:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
@@ -26,7 +26,7 @@ def silent(line: str) -> None:
 
 
 def number(value: float | None) -> str:
-    """Return a number with two decimals, or nothing."""
+    """Return a number with two decimals, or an empty string for None."""
     return "" if value is None else f"{value:.2f}"
 
 
@@ -38,7 +38,7 @@ def duration(seconds: float) -> str:
 
 
 def print_table(console: Console, headings: Sequence[str], table_rows: Sequence[Sequence[str]]) -> None:
-    """Print a table: drawn on a terminal, else aligned lines that nothing cuts off."""
+    """Print a table: with borders on a terminal, as aligned lines without truncation elsewhere."""
     if console.is_terminal:
         table = Table()
         for heading in headings:

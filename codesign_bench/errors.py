@@ -1,4 +1,4 @@
-"""Errors that a user causes and can mend; everything else keeps its traceback."""
+"""Errors that the user can fix; any other exception keeps its traceback."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 
 class UserError(Exception):
-    """Bad input, told in one or two lines by the command line (exit code 2)."""
+    """Bad input; the command line reports it in one or two lines (exit code 2)."""
 
 
 def unknown_name(kind: str, name: str, choices: Iterable[str]) -> UserError:
-    """Return the error for a name that is not among `choices`, listing them."""
+    """Return the error for a name that is not among `choices`; its message lists them."""
     return UserError(f"unknown {kind} '{name}'; choose from: {', '.join(choices)}")

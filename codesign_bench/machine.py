@@ -1,4 +1,4 @@
-"""What a result depends on besides its configuration: the machine and the versions of the packages."""
+"""The machine and the package versions, which a result depends on in addition to its configuration."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from typing import Any
 
 PACKAGES = ("codesign_bench", "numpy", "torch", "pymunk", "pybullet", "cma", "gymnasium")
 BFLOAT16_FLAGS = ("amx_bf16", "avx512_bf16", "bf16")
-"""What processors that compute in bfloat16 say of themselves: Intel's and AMD's, and ARM's."""
+"""CPU flags that indicate bfloat16 arithmetic: two of x86 (Intel, AMD) and one of ARM."""
 
 
 def available_cores() -> int:
-    """Return how many cores this process may use: its affinity and its container's quota count."""
-    import joblib  # not at the top: the process of a cell has no other use for it
+    """Return how many cores this process may use, given its affinity and its container's quota."""
+    import joblib  # imported here because the process of a cell does not need it otherwise
 
     return int(joblib.cpu_count())
 
 
 def package_versions() -> dict[str, str | None]:
-    """Return Python's version and those of the packages, without importing any; None is not installed."""
+    """Return the versions of Python and of `PACKAGES` without importing them; None: not installed."""
     found: dict[str, str | None] = {"python": platform.python_version()}
     for name in PACKAGES:
         try:
@@ -33,7 +33,7 @@ def package_versions() -> dict[str, str | None]:
 
 
 def host_facts(threads: int) -> dict[str, Any]:
-    """Return the machine's name, system, processor and cores, and the threads of one cell."""
+    """Return the machine's name, system, processor and number of cores, and the threads per cell."""
     return {
         "name": socket.gethostname(),
         "system": platform.platform(),
@@ -44,7 +44,7 @@ def host_facts(threads: int) -> dict[str, Any]:
 
 
 def computes_in_bfloat16() -> bool:
-    """Tell whether this processor multiplies matrices in bfloat16 itself; elsewhere that is slower than in fp32."""
+    """Return whether this processor has bfloat16 matrix products; without them, bfloat16 is slower than fp32."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""Members that a module named by `--import` defines, here and in every process started from here."""
+"""Register the members that `--import` modules define, in this process and in the processes it starts."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from codesign_bench.task import Task
 
 
 def import_modules(modules: list[str]) -> None:
-    """Import `modules` here and in every process started from here, and register what they define.
+    """Import `modules` in this process and in every process it starts, and register what they define.
 
-    A task and a method are classes, known by their `name`; a study is what the module calls `STUDY`; a module with
-    `TITLE`, `data` and `draw` is a figure, known by the last part of the module's name.
+    Tasks and methods are classes, registered under their `name`. A study is the module's attribute `STUDY`. A module
+    with `TITLE`, `data` and `draw` is a figure, registered under the last part of the module's name.
 
     Raises:
         UserError: a module cannot be found.
@@ -36,7 +36,7 @@ def import_modules(modules: list[str]) -> None:
 
 
 def _register_members(module: ModuleType) -> None:
-    """Register the tasks, the methods, the study and the figure that a module itself defines."""
+    """Register the tasks, the methods, the study and the figure that a module defines (not those it imports)."""
     for member in vars(module).values():
         if not inspect.isclass(member) or inspect.isabstract(member) or member.__module__ != module.__name__:
             continue

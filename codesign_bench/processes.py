@@ -1,4 +1,4 @@
-"""Processes of ours: the threads of their numerical libraries, and that none outlives its parent."""
+"""Child processes: one thread per numerical library, and no process that outlives its parent."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ THREAD_VARIABLES = (
     "NUMEXPR_NUM_THREADS",
     "VECLIB_MAXIMUM_THREADS",
 )
-"""What the numerical libraries read when they are first imported."""
+"""Environment variables that the numerical libraries read when they are first imported."""
 WATCH_SECONDS = 0.3
 EXIT_ORPHANED = 76
-"""Exit code of a process whose parent is gone."""
+"""Exit code of a process whose parent has ended."""
 
 
 def thread_environment() -> dict[str, str]:
@@ -25,11 +25,13 @@ def thread_environment() -> dict[str, str]:
 
 
 def end_with(parent_pid: int) -> None:
-    """End this process soon after its parent ends, however it ends: an orphan would hold a core for nothing."""
+    """End this process soon after its parent ends for any reason: an orphan would only keep a core busy."""
 
     def watch() -> None:
+        # A process whose parent has ended is adopted by another one, so its parent's id changes.
         while os.getppid() == parent_pid:
             time.sleep(WATCH_SECONDS)
+        # sys.exit would end this thread only.
         os._exit(EXIT_ORPHANED)
 
     threading.Thread(target=watch, daemon=True).start()

@@ -1,6 +1,6 @@
-"""Find tasks, methods, figures and studies: a file in the folder is an entry, as is a package's entry point.
+"""Find tasks, methods, figures and studies: files in the group's folder, entry points of packages, `--import`.
 
-Names are listed without importing anything, so that listing needs neither torch nor pybullet.
+Listing names imports no member, so it needs neither torch nor pybullet.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ IMPORTS_VARIABLE = "CODESIGN_BENCH_IMPORTS"
 """Environment variable through which `--import module` reaches the worker processes (module names, comma-separated)."""
 
 KINDS = {"methods": "method", "tasks": "task", "paper_figs": "figure", "studies": "study"}
-"""Groups of members, and what one of each is called."""
+"""The groups of members, and the singular that messages use for each."""
 
 _registered: dict[str, dict[str, Callable[[], Any]]] = {}
 
 
 def register(group: str, name: str, loader: Callable[[], Any]) -> None:
-    """Add the entry `name` to `group` (one of `KINDS`); `loader` returns its class or module. For `--import`."""
+    """Add the entry `name` to `group` (one of `KINDS`), for `--import`; `loader` returns its class or module."""
     _registered.setdefault(group, {})[name] = loader
 
 
 def names(group: str) -> tuple[str, ...]:
-    """Return every name in `group` (one of `KINDS`): built-in files, entry points, `--import`."""
+    """Return all names in `group` (one of `KINDS`): built-in files, then entry points, then `--import`."""
     return tuple(dict.fromkeys((*_files(group), *sorted(_entry_points(group)), *sorted(_registered.get(group, {})))))
 
 
 def built_in(group: str) -> tuple[str, ...]:
-    """Return the names in `group` that come with codesign-bench: the files of its folder."""
+    """Return the names in `group` that come with codesign-bench: the files in its folder."""
     return _files(group)
 
 
@@ -46,17 +46,17 @@ def presented(group: str) -> tuple[str, ...]:
 
 
 def in_order(group: str, found: Iterable[str]) -> list[str]:
-    """Return the `found` names of `group`, each once, in the order of listings; unknown ones last, by name."""
+    """Return the unique names in `found` in the order of `names(group)`; unknown names last, sorted."""
     present, known = set(found), names(group)
     return [name for name in known if name in present] + sorted(present - set(known))
 
 
 def load(group: str, name: str, base: type) -> Any:
-    """Return the one public subclass of `base` that the entry `name` of `group` defines.
+    """Return the public subclass of `base` that the entry `name` of `group` defines.
 
     Raises:
-        UserError: there is no such entry.
-        TypeError: its file does not define exactly one such class.
+        UserError: no entry has this name.
+        TypeError: its file does not define exactly one public subclass of `base`.
     """
     if name in _files(group):
         return single_subclass(importlib.import_module(f"codesign_bench.{group}.{name}"), base)
@@ -72,8 +72,8 @@ def load_module(group: str, name: str) -> ModuleType:
     """Return the module of the entry `name` of `group` (figures and studies are modules, not classes).
 
     Raises:
-        UserError: there is no such entry.
-        TypeError: it is something else than a module.
+        UserError: no entry has this name.
+        TypeError: the entry is not a module.
     """
     if name in _files(group):
         return importlib.import_module(f"codesign_bench.{group}.{name}")
@@ -89,11 +89,11 @@ def load_module(group: str, name: str) -> ModuleType:
 
 
 def load_attribute(group: str, name: str, attribute: str) -> Any:
-    """Return what the module of the entry `name` of `group` calls `attribute`.
+    """Return an attribute of the module of the entry `name` of `group`.
 
     Raises:
-        UserError: there is no such entry.
-        TypeError: its module has no such attribute.
+        UserError: no entry has this name.
+        TypeError: its module lacks the attribute.
     """
     module = load_module(group, name)
     if not hasattr(module, attribute):
@@ -102,10 +102,10 @@ def load_attribute(group: str, name: str, attribute: str) -> Any:
 
 
 def single_subclass(module: ModuleType, base: type) -> Any:
-    """Return the one public class that `module` itself defines below `base`.
+    """Return the public subclass of `base` that `module` defines (not one that it imports).
 
     Raises:
-        TypeError: there is none, or more than one.
+        TypeError: `module` does not define exactly one.
     """
     found = [
         member

@@ -1,4 +1,4 @@
-"""Named, independent random streams from one seed; nothing else in the project makes randomness."""
+"""Named, independent random streams from one seed: the only source of randomness in the project."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 class Streams:
     """The random streams of one run: `streams["rollout"]` is always the same generator object.
 
-    A stream depends on the seed and on its name alone, so a new stream never shifts the others.
+    A stream depends only on the seed and its own name, so adding a stream does not change the others.
     """
 
     def __init__(self, seed: int) -> None:
@@ -28,11 +28,12 @@ class Streams:
         return {name: rng.bit_generator.state for name, rng in self._generators.items()}
 
     def load_state(self, state: dict[str, Any]) -> None:
-        """Put every stream back where `state` says."""
+        """Restore every stream from `state`."""
         for name, value in state.items():
             self[name].bit_generator.state = value
 
 
 def generator(seed: int, name: str) -> np.random.Generator:
-    """Return a fresh generator for the stream `name` of `seed`."""
+    """Return a new generator for the stream `name` of `seed`."""
+    # Not `hash`, which Python salts differently in every process.
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(zlib.crc32(name.encode()),)))

@@ -1,4 +1,4 @@
-"""Tables as text: Markdown for pages, LaTeX for papers."""
+"""Tables as text: Markdown for web pages, LaTeX for papers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 COLUMN_END = re.compile(r"(?<!\\)\|")
-"""A bar that is no part of a cell."""
+"""A bar between cells; one inside a cell is escaped."""
 
 LATEX_SPECIAL = {
     "\\": r"\textbackslash{}",
@@ -29,7 +29,7 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def read_markdown(text: str) -> tuple[list[str], list[list[str]]] | None:
-    """Return header and rows of a table that `markdown` wrote, or None if `text` is anything else besides."""
+    """Return header and rows of a table that `markdown` wrote, or None if `text` is not exactly one such table."""
     lines = text.strip().splitlines()
     if len(lines) < 2 or not all(line.startswith("| ") and line.endswith(" |") for line in lines):
         return None
@@ -42,7 +42,7 @@ def read_markdown(text: str) -> tuple[list[str], list[list[str]]] | None:
 
 
 def latex(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a LaTeX tabular with booktabs' rules, text left and everything else right."""
+    """Return a LaTeX tabular with booktabs rules; columns of numbers are aligned right, others left."""
     columns = "".join("r" if is_number(cell) else "l" for cell in (rows[0] if rows else header))
     body = [" & ".join(_escaped(text) for text in line) + r" \\" for line in (header, *rows)]
     lines = [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", body[0], r"\midrule", *body[1:], r"\bottomrule"]
@@ -54,5 +54,5 @@ def _escaped(text: str) -> str:
 
 
 def is_number(text: str) -> bool:
-    """Tell whether a cell is a number, or the dash that stands for a missing one."""
+    """Return whether a cell is a number, or the dash that stands for a missing one."""
     return text.replace(",", "").replace(".", "").replace("-", "").isdigit() or text == "-"

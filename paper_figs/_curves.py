@@ -143,7 +143,7 @@ def _legend_columns(table: pd.DataFrame, narrow: bool) -> int:
 
 
 def _compares(table: pd.DataFrame) -> bool:
-    """Tell whether there are compared results, which have long names."""
+    """Return whether there are compared results, which have long names."""
     return any(is_compared(name) for name in table["method"].unique())
 
 

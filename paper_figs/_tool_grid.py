@@ -30,7 +30,7 @@ def cut_alike(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def is_map(grid: pd.DataFrame) -> bool:
-    """Tell whether pictures stand by two entries of their goals; otherwise they make a row in one entry."""
+    """Return whether pictures stand by two entries of their goals; otherwise they make a row in one entry."""
     return bool(grid["up"].iloc[0])
 
 

@@ -25,7 +25,7 @@ RECORDS = (CURVE_FILE, METRICS_FILE, EVALUATION_FILE, CELL_FILE)
 
 
 def ships_policy(cell: CellRecord) -> bool:
-    """Tell whether a cell's policy is shipped."""
+    """Return whether a cell's policy is shipped."""
     return cell.seed == 0 or (cell.method == OURS and cell.variant == DEFAULT)
 
 

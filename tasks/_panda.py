@@ -216,7 +216,7 @@ class _OnPanda(HeldTool):
         )
 
     def _touches(self, bodies: Iterable[int]) -> bool:
-        """Tell whether a link of the arm that moves, the tool excepted, touches one of `bodies`."""
+        """Return whether a link of the arm that moves, the tool excepted, touches one of `bodies`."""
         return any(
             point[3] not in (-1, self.tool_link) and point[8] < 0.0
             for body in bodies

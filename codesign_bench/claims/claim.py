@@ -26,7 +26,7 @@ class Rule:
     needs: tuple[str, ...]
     """Commands that make the data; `{results}` stands for the results folder, `{profile}` for its option or nothing."""
     judge: Callable[[Evidence, np.random.Generator], Finding]
-    """The rule itself; raises `Lacking` where data are missing."""
+    """The rule itself; raises `InsufficientData` where data are missing."""
     measure: Callable[[Path, Log], object] | None = None
     """Makes what no cell holds by playing finished policies or scripts, if it is missing; it may take minutes."""
 

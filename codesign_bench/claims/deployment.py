@@ -7,7 +7,7 @@ import pandas as pd
 
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, Lacking
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, InsufficientData
 from codesign_bench.deployment.tables import GRID, OWN
 
 
@@ -23,7 +23,7 @@ def own_instance_solved(task: str, method: str, *, tools: int, trials: int) -> R
         rates = rows.groupby("tool")["success"].mean()
         made = int(rows.groupby("tool").size().min())
         if made < trials:
-            raise Lacking(f"{made} trials of a tool of {task}; {trials} are needed")
+            raise InsufficientData(f"{made} trials of a tool of {task}; {trials} are needed")
         share = float((rates > 0.5).mean())
         n = f"{len(rates)} tools, {len(rows)} trials"
         return Finding(SUPPORTED if share == 1.0 else CONTRADICTED, share, n=n, note=_told(rows))
@@ -49,11 +49,11 @@ def no_tool_solves_the_grid(task: str, method: str, *, tools: int, starts: int) 
         rows = _trials(evidence, task, GRID, tools)
         tried = int(rows.groupby("tool").size().min())
         if tried < starts:
-            raise Lacking(f"{tried} starts of the grid of {task} were tried with a tool; {starts} are needed")
+            raise InsufficientData(f"{tried} starts of the grid of {task} were tried with a tool; {starts} are needed")
         solved = rows.pivot_table(index="tool", columns=["row", "column"], values="success") > 0
         solvable = solved.loc[:, solved.any()]
         if solvable.shape[1] == 0:
-            raise Lacking(f"no tool solves any start of the grid of {task}")
+            raise InsufficientData(f"no tool solves any start of the grid of {task}")
         best = float(solvable.mean(axis=1).max())
         n = f"{len(solved)} tools, {solvable.shape[1]} of {solved.shape[1]} starts"
         return Finding(SUPPORTED if best < 1.0 else CONTRADICTED, best, n=n, note=_told(rows))
@@ -72,13 +72,13 @@ def _trials(evidence: Evidence, task: str, kind: str, fewest: int) -> pd.DataFra
     """Return the trials of one kind and task, of at least `fewest` tools.
 
     Raises:
-        Lacking: there are too few tools.
+        InsufficientData: there are too few tools.
     """
     frame = evidence.deployment
     rows = frame[(frame["task"] == task) & (frame["kind"] == kind)] if len(frame) else frame
     tools = rows["tool"].nunique() if len(rows) else 0
     if tools < fewest:
-        raise Lacking(f"{tools} tools of {task} were deployed; {fewest} are needed")
+        raise InsufficientData(f"{tools} tools of {task} were deployed; {fewest} are needed")
     return rows
 
 

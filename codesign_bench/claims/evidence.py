@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from codesign_bench.cell.variant import DEFAULT, Variant
-from codesign_bench.claims.finding import Lacking
+from codesign_bench.claims.finding import InsufficientData
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.deployment.tables import load_deployment
 from codesign_bench.errors import UserError
@@ -29,7 +29,7 @@ DESIGN_PREFIX = "design_"
 
 @dataclass(frozen=True)
 class Evidence:
-    """Frames that may be empty; every method that finds no data says so by `Lacking`."""
+    """Frames that may be empty; every method that finds no data says so by `InsufficientData`."""
 
     curves: pd.DataFrame = field(default_factory=pd.DataFrame)
     """As `codesign_bench.load_results` gives them."""
@@ -56,20 +56,20 @@ class Evidence:
         """Return the final evaluation of the finished cells of one method, task and variant, one row per instance.
 
         Raises:
-            Lacking: there are fewer than `MIN_SEEDS` finished seeds.
+            InsufficientData: there are fewer than `MIN_SEEDS` finished seeds.
         """
         rows = _select(self.evaluations, task, method, variant)
         seeds = rows["seed"].nunique() if len(rows) else 0
         if seeds < MIN_SEEDS:
             counted = f"{seeds} finished seed{'' if seeds == 1 else 's'}"
-            raise Lacking(f"{counted} of {task}/{method}/{variant.name}; {MIN_SEEDS} are needed")
+            raise InsufficientData(f"{counted} of {task}/{method}/{variant.name}; {MIN_SEEDS} are needed")
         return rows
 
     def final_returns(self, task: str, method: str, variant: Variant = DEFAULT) -> np.ndarray:
         """Return the mean return over evaluation instances at the end of training, (N,).
 
         Raises:
-            Lacking: as `instances` does.
+            InsufficientData: as `instances` does.
         """
         return self.instances(task, method, variant).groupby("seed")["return"].mean().to_numpy()
 
@@ -77,19 +77,19 @@ class Evidence:
         """Return the learning curves of the finished cells of one method, task and variant.
 
         Raises:
-            Lacking: as `instances` does, or a finished cell lacks its curve.
+            InsufficientData: as `instances` does, or a finished cell lacks its curve.
         """
         finished = self.instances(task, method, variant)["seed"].unique()
         rows = _select(self.curves, task, method, variant)
         if not len(rows) or not set(finished) <= set(rows["seed"]):
-            raise Lacking(f"a finished cell of {task}/{method}/{variant.name} has no curve")
+            raise InsufficientData(f"a finished cell of {task}/{method}/{variant.name} has no curve")
         return rows[rows["seed"].isin(finished)]
 
     def budget(self, task: str, method: str, variant: Variant = DEFAULT) -> float:
         """Return the mean environment steps at the end of training over finished seeds.
 
         Raises:
-            Lacking: as `curve` does.
+            InsufficientData: as `curve` does.
         """
         return float(self.curve(task, method, variant).groupby("seed")["env_steps"].max().mean())
 

@@ -11,7 +11,7 @@ NOT_ASKED = "not asked"
 """In place of a verdict: the results hold nothing of a task that the claim speaks of."""
 
 
-class Lacking(Exception):
+class InsufficientData(Exception):
     """The results do not hold what a rule needs; the message says what is lacking."""
 
 

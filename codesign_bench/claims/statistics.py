@@ -13,7 +13,7 @@ from scipy.stats import rankdata
 from codesign_bench import stats
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import Lacking
+from codesign_bench.claims.finding import InsufficientData
 
 OVER_SEEDS = "the 95 % bootstrap interval over seeds"
 BUDGET_TOLERANCE = 0.1
@@ -71,16 +71,16 @@ def at_each(levels: Sequence[float], read: Callable[[float], np.ndarray]) -> dic
     """Return what `read` finds at each level in rising order, leaving out levels without data.
 
     Raises:
-        Lacking: fewer than `FEWEST_LEVELS` levels have data.
+        InsufficientData: fewer than `FEWEST_LEVELS` levels have data.
     """
     found, reasons = {}, []
     for level in sorted(levels):
         try:
             found[level] = read(level)
-        except Lacking as lacking:
-            reasons.append(str(lacking))
+        except InsufficientData as error:
+            reasons.append(str(error))
     if len(found) < FEWEST_LEVELS:
-        raise Lacking(reasons[0])
+        raise InsufficientData(reasons[0])
     return found
 
 
@@ -88,19 +88,19 @@ def check_budgets(evidence: Evidence, task: str, *sides: tuple[str, Variant]) ->
     """Check that all sides, each (method, variant), were trained for the same number of environment steps.
 
     Raises:
-        Lacking: they were not, or a side lacks cells.
+        InsufficientData: they were not, or a side lacks cells.
     """
     budgets = [evidence.budget(task, method, variant) for method, variant in sides]
     if max(budgets) > (1.0 + BUDGET_TOLERANCE) * min(budgets):
         told = " and ".join(f"{budget:,.0f}" for budget in budgets)
-        raise Lacking(f"budgets differ on {task}: {told} environment steps")
+        raise InsufficientData(f"budgets differ on {task}: {told} environment steps")
 
 
 def check_methods(evidence: Evidence, task: str, *methods: str) -> None:
     """Check the budgets of methods' default cells.
 
     Raises:
-        Lacking: as `check_budgets` does.
+        InsufficientData: as `check_budgets` does.
     """
     check_budgets(evidence, task, *((method, DEFAULT) for method in methods))
 

@@ -12,7 +12,7 @@ import pandas as pd
 
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, Lacking, above
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, InsufficientData, above
 from codesign_bench.claims.statistics import OVER_SEEDS, estimate, mean, run_command, seeds_of
 from codesign_bench.evaluation.sensitivity import measure_missing
 
@@ -28,7 +28,7 @@ def tools_vary(task: str, method: str, seeds: int) -> Rule:
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         rows = evidence.instances(task, method)
         if task not in evidence.design_widths:
-            raise Lacking(f"the task '{task}' is not known here")
+            raise InsufficientData(f"the task '{task}' is not known here")
         shares = goal_shares(rows, evidence.design_widths[task])
         value, low, high = estimate([shares], mean, rng)
         return Finding(above(low, high, GOAL_SHARE), value, low, high, seeds_of(shares))
@@ -66,11 +66,13 @@ def no_single_tool(task: str) -> Rule:
         frame = evidence.sensitivity
         rows = frame[frame["task"] == task] if len(frame) else frame
         if rows.empty:
-            raise Lacking(f"the design sensitivity of {task} is not measured")
+            raise InsufficientData(f"the design sensitivity of {task} is not measured")
         solved = rows.pivot(index="tool", columns="goal", values="success") > 0
         solvable = solved.loc[:, solved.any()]
         if len(solved) < FEWEST_TOOLS or solvable.shape[1] < 2:
-            raise Lacking(f"{len(solved)} tools and {solvable.shape[1]} goals that any of them solves are too few")
+            raise InsufficientData(
+                f"{len(solved)} tools and {solvable.shape[1]} goals that any of them solves are too few"
+            )
         best = float(solvable.mean(axis=1).max())
         n = f"{len(solved)} tools, {solvable.shape[1]} of {solved.shape[1]} goals"
         return Finding(SUPPORTED if best < 1.0 else CONTRADICTED, best, n=n, note="one controller, written by hand")

@@ -12,7 +12,7 @@ import numpy as np
 from codesign_bench.cell.variant import Variant
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import Finding, Lacking, above, below
+from codesign_bench.claims.finding import Finding, InsufficientData, above, below
 from codesign_bench.claims.statistics import FEWEST_LEVELS, OVER_SEEDS, at_each, estimate, mean, seeds_at_each, trend
 
 MATERIAL, EFFORT, RATIO = "material", "effort", "ratio"
@@ -82,5 +82,5 @@ def _quantity(evidence: Evidence, task: str, method: str, alpha: float, quantity
     if quantity != RATIO:
         return means[quantity].to_numpy()
     if (means[EFFORT] <= 0.0).any():
-        raise Lacking(f"a seed of {task}/{method}/{variant.name} never moves: its ratio is infinite")
+        raise InsufficientData(f"a seed of {task}/{method}/{variant.name} never moves: its ratio is infinite")
     return (means[MATERIAL] / means[EFFORT]).to_numpy()

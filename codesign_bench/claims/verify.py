@@ -14,7 +14,7 @@ from rich.console import Console
 from codesign_bench import __version__, stats
 from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.evidence import Evidence, load_evidence
-from codesign_bench.claims.finding import CONTRADICTED, NOT_ASKED, UNDECIDED, VERDICTS, Finding, Lacking
+from codesign_bench.claims.finding import CONTRADICTED, NOT_ASKED, UNDECIDED, VERDICTS, Finding, InsufficientData
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.console import Log, print_table, printer
 from codesign_bench.errors import UserError
@@ -81,8 +81,8 @@ def _row(claim: Claim, evidence: Evidence, results: str) -> Row:
         return Row(claim, Finding(NOT_ASKED, math.nan, note=f"no results of {', '.join(absent)}"), needs)
     try:
         return Row(claim, claim.rule.judge(evidence, generator(SEED, f"claim {claim.name}")))
-    except Lacking as lacking:
-        return Row(claim, Finding(UNDECIDED, math.nan, note=str(lacking)), needs)
+    except InsufficientData as error:
+        return Row(claim, Finding(UNDECIDED, math.nan, note=str(error)), needs)
 
 
 def verify(study: Claimant, results: Path, out: Path, console: Console, *, measure: bool = False) -> None:

@@ -13,7 +13,7 @@ import pandas as pd
 from codesign_bench.cell.variant import Variant
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import Finding, Lacking, above, below
+from codesign_bench.claims.finding import Finding, InsufficientData, above, below
 from codesign_bench.claims.statistics import (
     FEWEST_LEVELS,
     OVER_SEEDS,
@@ -115,7 +115,9 @@ def outside_solved(task: str, method: str, needs: str) -> Rule:
         rows = frame[(frame["task"] == task) & (frame["method"] == method)] if len(frame) else frame
         rates = rows.groupby("seed")["success"].mean().to_numpy() if len(rows) else np.empty(0)
         if len(rates) < MIN_SEEDS:
-            raise Lacking(f"{len(rates)} seeds of {task}/{method} measured outside the region; {MIN_SEEDS} are needed")
+            raise InsufficientData(
+                f"{len(rates)} seeds of {task}/{method} measured outside the region; {MIN_SEEDS} are needed"
+            )
         value, low, high = estimate([rates], mean, rng)
         n = f"{seeds_of(rates)}, {rows['instance'].nunique()} instances"
         return Finding(above(low, high, OUTSIDE_SOLVED), value, low, high, n)
@@ -146,7 +148,7 @@ def _cutout_rows(evidence: Evidence, task: str, method: str, fraction: float) ->
     variant = Variant.of(cutout=fraction)
     rows = evidence.instances(task, method, variant)
     if "in_cutout" not in rows.columns or rows["in_cutout"].isna().any() or rows["in_cutout"].nunique() < 2:
-        raise Lacking(f"no instances both in and outside the cutout of {task}/{method}/{variant.name}")
+        raise InsufficientData(f"no instances both in and outside the cutout of {task}/{method}/{variant.name}")
     return rows
 
 
@@ -155,5 +157,7 @@ def _seen_and_unseen(evidence: Evidence, task: str, method: str, fraction: float
     rows = _cutout_rows(evidence, task, method, fraction)
     means = rows.groupby(["seed", "in_cutout"])["return"].mean().unstack("in_cutout").to_numpy()
     if (means[:, 0] <= 0.0).any():
-        raise Lacking(f"nothing was learned to compare with: return {means[:, 0].min():.2f} on the training region")
+        raise InsufficientData(
+            f"nothing was learned to compare with: return {means[:, 0].min():.2f} on the training region"
+        )
     return means

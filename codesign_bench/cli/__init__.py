@@ -1,4 +1,4 @@
-"""The command line: one file per command, its arguments beside what it does."""
+"""The command line: one file per command, with its arguments and its action."""
 
 from codesign_bench.cli.program import main
 

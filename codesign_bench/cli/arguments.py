@@ -1,4 +1,4 @@
-"""Arguments that several commands share: where results lie, how values are written, what names mean."""
+"""Arguments that several commands share: folders, number formats and groups of names."""
 
 from __future__ import annotations
 
@@ -22,34 +22,44 @@ ALL, BEYOND = "all", "beyond"
 def add_results(parser: argparse.ArgumentParser) -> None:
     """Add `--results`, the folder that a command reads."""
     parser.add_argument(
-        "--results", type=Path, default=DEFAULT_RESULTS, metavar="DIR", help=f"default: {DEFAULT_RESULTS}"
+        "--results",
+        type=Path,
+        default=DEFAULT_RESULTS,
+        metavar="DIR",
+        help=f"results folder; default: {DEFAULT_RESULTS}",
     )
 
 
 def add_out(parser: argparse.ArgumentParser, default: Path, metavar: str = "DIR") -> None:
-    """Add `--out`, where a command writes."""
-    parser.add_argument("--out", type=Path, default=default, metavar=metavar, help=f"default: {default}")
+    """Add `--out`, the file or folder that a command writes."""
+    kind = "file" if metavar == "FILE" else "folder"
+    parser.add_argument("--out", type=Path, default=default, metavar=metavar, help=f"output {kind}; default: {default}")
 
 
 def add_profile(parser: argparse.ArgumentParser) -> None:
     """Add `--profile`."""
-    parser.add_argument("--profile", default=DEFAULT_PROFILE, metavar="P", help=f"default: {DEFAULT_PROFILE}")
-
-
-def add_study(parser: argparse.ArgumentParser) -> None:
-    """Add `--study`, whose experiments, figures and claims a command works with."""
-    parser.add_argument("--study", default=DEFAULT_STUDY, metavar="NAME", help=f"default: {DEFAULT_STUDY}, the paper's")
-
-
-def add_jobs(parser: argparse.ArgumentParser) -> None:
-    """Add `--jobs`, the number of cells at a time."""
     parser.add_argument(
-        "--jobs", type=integer, metavar="N", help="cells at a time; default: as many as there are cores"
+        "--profile", default=DEFAULT_PROFILE, metavar="P", help=f"a name that `list` shows; default: {DEFAULT_PROFILE}"
     )
 
 
+def add_study(parser: argparse.ArgumentParser) -> None:
+    """Add `--study`, the source of a command's experiments, figures and claims."""
+    parser.add_argument(
+        "--study",
+        default=DEFAULT_STUDY,
+        metavar="NAME",
+        help=f"source of experiments, figures and claims; default: {DEFAULT_STUDY}, the paper's study",
+    )
+
+
+def add_jobs(parser: argparse.ArgumentParser) -> None:
+    """Add `--jobs`, the number of cells that run at a time."""
+    parser.add_argument("--jobs", type=integer, metavar="N", help="cells that run at a time; default: one per core")
+
+
 def add_config(parser: argparse.ArgumentParser) -> None:
-    """Add what decides a cell's configuration: profile, budget and single settings."""
+    """Add what determines a cell's configuration: profile, budget and individual settings."""
     add_profile(parser)
     parser.add_argument(
         "--steps", type=integer, metavar="N", help="budget in environment steps (default: the profile's)"
@@ -81,10 +91,10 @@ def seed(text: str) -> int:
 
 
 def check_at_least_one(options: argparse.Namespace, *options_names: str) -> None:
-    """Refuse options, if given, that are below 1.
+    """Check that the options that are given are at least 1.
 
     Raises:
-        UserError: naming the first.
+        UserError: one is not; names the first.
     """
     for name in options_names:
         value = getattr(options, name)
@@ -93,15 +103,15 @@ def check_at_least_one(options: argparse.Namespace, *options_names: str) -> None
 
 
 def chosen_names(group: str, given: Sequence[str], meanings: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return the names that an argument means, in the order given: separate words or commas.
+    """Return the names that an argument selects, in the given order.
 
     Args:
         group: one of `registry.KINDS`.
-        given: words of the command line.
+        given: words of the command line; each may contain several names, separated by commas.
         meanings: words that stand for several names, e.g. `all`.
 
     Raises:
-        UserError: an unknown name, or none at all.
+        UserError: an unknown name, or no name at all.
     """
     words = [word for text in given for word in text.split(",") if word]
     chosen = list(dict.fromkeys(name for word in words for name in meanings.get(word, (word,))))
@@ -115,19 +125,19 @@ def chosen_names(group: str, given: Sequence[str], meanings: Mapping[str, Sequen
 
 
 def chosen_tasks(given: Sequence[str]) -> list[str]:
-    """Return the tasks that `--task` means.
+    """Return the tasks that `--task` selects.
 
     Raises:
-        UserError: an unknown name, or none at all.
+        UserError: an unknown name, or no name at all.
     """
     return chosen_names("tasks", given, {ALL: names("tasks")})
 
 
 def chosen_methods(given: Sequence[str]) -> list[str]:
-    """Return the methods that `--method` means: `all` is those of the default study, `beyond` all others.
+    """Return the methods that `--method` selects: `all` is those of the default study, `beyond` all others.
 
     Raises:
-        UserError: an unknown name, or none at all.
+        UserError: an unknown name, or no name at all.
     """
     paper = load_study(DEFAULT_STUDY).methods
     beyond = tuple(name for name in names("methods") if name not in paper)

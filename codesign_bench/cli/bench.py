@@ -1,4 +1,4 @@
-"""`codesign-bench bench`: measure speed on this machine."""
+"""`codesign-bench bench`: measure the speed of tasks and learners on this machine."""
 
 from __future__ import annotations
 
@@ -11,26 +11,32 @@ from codesign_bench.cli.arguments import ALL, check_at_least_one, chosen_tasks, 
 from codesign_bench.config.profiles import profile_named
 from codesign_bench.errors import unknown_name
 
-HELP = "measure speed on this machine"
+HELP = "measure the speed of tasks and learners on this machine"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what is measured, and how."""
+    """Add what is measured and how."""
     kinds = parser.add_subparsers(required=True, metavar="tasks|learner", dest="what")
-    tasks = kinds.add_parser("tasks", help="environment steps beside the raw engine", allow_abbrev=False)
+    tasks = kinds.add_parser(
+        "tasks", help="environment steps, compared with the bare physics engine", allow_abbrev=False
+    )
     tasks.add_argument("--task", nargs="+", default=[ALL], metavar="T", help="names, or all (default)")
-    tasks.add_argument("--seconds", type=float, default=5.0, metavar="S", help="for each task; default: 5")
-    learner = kinds.add_parser("learner", help="our learners beside others'", allow_abbrev=False)
-    learner.add_argument("--task", metavar="T", help="default: the first that `list` shows")
-    learner.add_argument("--profile", metavar="P", help="whose networks; default: the paper's")
-    learner.add_argument("--cores", type=integer, default=1, metavar="N", help="default: 1")
-    learner.add_argument("--cells", type=integer, default=1, metavar="N", help="cells at once; default: 1")
-    learner.add_argument("--batch-size", type=integer, default=50_000, metavar="N", help="default: 50000")
-    learner.add_argument("--minibatch-size", type=integer, default=2_000, metavar="N", help="default: 2000")
-    learner.add_argument("--epochs", type=integer, default=10, metavar="N", help="default: 10")
-    learner.add_argument("--repeats", type=integer, default=3, metavar="N", help="default: 3")
-    learner.add_argument("--only", nargs="+", metavar="NAME", help="some of the learners; default: all")
-    learner.add_argument("--out", type=Path, metavar="FILE", help="write the numbers there as JSON")
+    tasks.add_argument("--seconds", type=float, default=5.0, metavar="S", help="seconds per task; default: 5")
+    learner = kinds.add_parser("learner", help="learners, compared with those of other libraries", allow_abbrev=False)
+    learner.add_argument("--task", metavar="T", help="default: the first task that `list` shows")
+    learner.add_argument("--profile", metavar="P", help="profile of the networks; default: the paper's")
+    learner.add_argument("--cores", type=integer, default=1, metavar="N", help="cores per cell; default: 1")
+    learner.add_argument("--cells", type=integer, default=1, metavar="N", help="cells that run at a time; default: 1")
+    learner.add_argument(
+        "--batch-size", type=integer, default=50_000, metavar="N", help="steps per batch; default: 50000"
+    )
+    learner.add_argument(
+        "--minibatch-size", type=integer, default=2_000, metavar="N", help="steps per minibatch; default: 2000"
+    )
+    learner.add_argument("--epochs", type=integer, default=10, metavar="N", help="epochs per batch; default: 10")
+    learner.add_argument("--repeats", type=integer, default=3, metavar="N", help="timed batches; default: 3")
+    learner.add_argument("--only", nargs="+", metavar="NAME", help="names of learners; default: all")
+    learner.add_argument("--out", type=Path, metavar="FILE", help="also write the numbers to this JSON file")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

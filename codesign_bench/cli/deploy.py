@@ -1,4 +1,4 @@
-"""`codesign-bench deploy`: try a policy and its tools on a simulated robot arm."""
+"""`codesign-bench deploy`: run a policy and its tools on a simulated robot arm."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from codesign_bench.cli.arguments import DEFAULT_RESULTS, add_out, integer, seed
 from codesign_bench.console import printer
 from codesign_bench.errors import UserError
 
-HELP = "try a policy and its tools on a simulated robot arm"
+HELP = "run a policy and its tools on a simulated robot arm"
 CONDITIONS = ("arm", "observation_noise", "latency", "friction", "mass")
-"""Options that change a condition of the trials."""
+"""Options that set a condition of the trials."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the policy, its trials and their conditions."""
+    """Add the policy, the trials and their conditions."""
     parser.add_argument("--policy", type=Path, required=True, metavar="CELL", help="folder of a finished cell")
     parser.add_argument("--task", metavar="T", help="default: the task of --policy")
     parser.add_argument(
-        "--protocol", action="store_true", help="the paper's Table 1: five trials of each tool, and the grid of starts"
+        "--protocol", action="store_true", help="the paper's Table 1: five trials of each tool and the grid of starts"
     )
-    parser.add_argument("--tool", nargs="+", type=integer, default=[], metavar="N", help="default: all of them")
-    parser.add_argument("--trials", type=integer, metavar="N", help="of each tool; default: 1")
-    parser.add_argument("--arm", help="panda (default), or ideal: the gantry of training")
+    parser.add_argument("--tool", nargs="+", type=integer, default=[], metavar="N", help="tools; default: all of them")
+    parser.add_argument("--trials", type=integer, metavar="N", help="trials of each tool; default: 1")
+    parser.add_argument("--arm", help="panda (default), or ideal: the gantry used in training")
     parser.add_argument(
         "--observation-noise",
         type=float,
         metavar="M",
-        help="standard deviation of every observed length, m (default 0; the protocol uses 0.002)",
+        help="standard deviation of the noise on every observed length, m (default 0; the protocol uses 0.002)",
     )
     parser.add_argument(
         "--latency", type=integer, metavar="STEPS", help="delay of the observed state (default 0; the protocol uses 1)"
@@ -43,12 +43,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             help=f"randomise {name} by up to +-SHARE (default 0; the protocol uses 0.2)",
         )
     parser.add_argument("--seed", type=seed, default=0, help="seed of noise and randomisation; default: 0")
-    parser.add_argument("--no-gifs", action="store_true", help="do not draw the trials")
+    parser.add_argument("--no-gifs", action="store_true", help="do not write animations of the trials")
     add_out(parser, DEFAULT_RESULTS)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Run the trials and write their tables and pictures."""
+    """Run the trials and write the tables and pictures."""
     from dataclasses import replace
 
     from codesign_bench.deployment.conditions import TRIAL, Conditions

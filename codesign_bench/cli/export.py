@@ -1,4 +1,4 @@
-"""`codesign-bench export`: write a policy's tools as solids to print."""
+"""`codesign-bench export`: write a policy's tools as printable meshes."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from rich.console import Console
 
 from codesign_bench.console import printer
 
-HELP = "write a policy's tools as solids to print"
+HELP = "write a policy's tools as printable meshes"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the policy, the instances whose tools are written, and the folder."""
-    # So that a value that starts with a minus sign, as in `--start -0.2,0.7`, is not read as an option.
+    # argparse would read a value such as `-0.2,0.7` as an option: its own pattern matches single numbers only.
     parser._negative_number_matcher = re.compile(r"^-\.?\d")
     parser.add_argument("--policy", type=Path, required=True, metavar="CELL", help="folder of a finished cell")
     parser.add_argument("--task", metavar="T", help="default: the task of --policy")
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--start", metavar="X,Y", help="the tool for an object that starts there, m")
+    which.add_argument("--start", metavar="X,Y", help="the tool for an object that starts at this position, m")
     which.add_argument("--goal", metavar="G,...", help="the tool for this goal, in the task's units")
     which.add_argument(
         "--instances", metavar="N,...", help="tools for these evaluation instances; default: all of them"
     )
-    parser.add_argument("--scale", type=float, default=1.0, metavar="S", help="size of the print; default: 1")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--scale", type=float, default=1.0, metavar="S", help="scale of the print; default: 1")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="output folder")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

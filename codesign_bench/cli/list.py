@@ -1,4 +1,4 @@
-"""`codesign-bench list`: names of methods, tasks, figures, studies and profiles; imports neither methods nor tasks."""
+"""`codesign-bench list`: names of methods, tasks, figures, studies and profiles; imports no method and no task."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from codesign_bench.console import printer
 from codesign_bench.registry import names
 from codesign_bench.study import DEFAULT_STUDY, load_study, study_names
 
-HELP = "names of methods, tasks, figures, studies and profiles"
+HELP = "list methods, tasks, figures, studies and profiles"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add nothing: `list` has no arguments of its own."""
+    """Add nothing: `list` takes no arguments."""
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

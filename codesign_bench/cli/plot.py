@@ -11,13 +11,16 @@ from codesign_bench.cli.arguments import DEFAULT_FIGURES, add_out, add_results, 
 from codesign_bench.console import printer
 from codesign_bench.study import load_study
 
-HELP = "draw the figures that the results allow"
+HELP = "draw figures from results"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the figures, and the folders that they are drawn from and to."""
+    """Add the figures, the results they are drawn from and the folder they are written to."""
     parser.add_argument(
-        "figures", nargs="*", metavar="FIGURE", help="default: every figure of the study that the results allow"
+        "figures",
+        nargs="*",
+        metavar="FIGURE",
+        help="default: every figure of the study that can be drawn from the results",
     )
     add_study(parser)
     add_results(parser)

@@ -1,4 +1,4 @@
-"""The program: arguments in, exit code out. 0 is success, 1 a failed cell, 2 bad input, 130 an interruption."""
+"""The program's entry point. Exit codes: 0 success, 1 a cell failed, 2 bad input, 130 interrupted."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ COMMANDS = (
     "export",
     "bench",
 )
-"""Modules of this package, one per command, in the order of `--help`; each has HELP, `add_arguments` and `run`."""
+"""The modules of the commands, in the order of `--help`; each defines HELP, `add_arguments` and `run`."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """Answers bad input in two lines."""
+    """An argument parser that reports bad input in two lines."""
 
     def error(self, message: str) -> NoReturn:
         print(f"{self.prog}: {' '.join(message.split())}\nsee: {self.prog} --help", file=sys.stderr)
@@ -58,13 +58,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("\ninterrupted; the same command resumes", file=sys.stderr)
         return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader of our output, e.g. `head`, has seen enough
+    except BrokenPipeError:  # the reader of the output, e.g. `head`, has closed the pipe
         sys.stderr.close()
         return 0
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """Return the parser of all commands."""
+    """Return the parser for all commands."""
     parser = _Parser(
         prog=PROGRAM, description="Benchmark methods that learn a tool's design together with its control."
     )
@@ -80,13 +80,13 @@ def build_parser() -> argparse.ArgumentParser:
             metavar="MODULE",
             action="append",
             default=[],
-            help="import a module that defines your own members, e.g. a task; may be repeated",
+            help="import a module that defines tasks, methods, figures or a study; may be repeated",
         )
         module.add_arguments(command)
     return parser
 
 
 def _extend_path(imports: Sequence[str]) -> None:
-    """Find `--import` modules in the working folder, as `python -m` would."""
+    """Make `--import` find modules in the working folder, as `python -m` does."""
     if imports and "" not in sys.path:
         sys.path.insert(0, "")

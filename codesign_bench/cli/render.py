@@ -1,4 +1,4 @@
-"""`codesign-bench render`: what a policy, a script or random behaviour does, as an animation or a picture."""
+"""`codesign-bench render`: draw episodes of a policy, a script or random behaviour as an animation or a picture."""
 
 from __future__ import annotations
 
@@ -11,20 +11,22 @@ from codesign_bench.cli.arguments import check_at_least_one, integer, seed
 from codesign_bench.console import printer
 from codesign_bench.errors import UserError
 
-HELP = "draw what a policy does, as an animation or a picture"
+HELP = "draw episodes of a policy, as an animation or a picture"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what acts, on which task, and the file."""
+    """Add the behaviour, the task and the output file."""
     parser.add_argument("--task", metavar="T", help="default: the task of --policy")
     parser.add_argument(
-        "--policy", type=Path, metavar="CELL", help="folder of a finished cell, whose final policy acts"
+        "--policy", type=Path, metavar="CELL", help="folder of a finished cell, whose final policy is used"
     )
     parser.add_argument(
-        "--behaviour", choices=("random", "script"), help="what acts without --policy; default: the task's script"
+        "--behaviour", choices=("random", "script"), help="used without --policy; default: the task's script"
     )
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="ends in .gif or .png")
-    parser.add_argument("--episodes", type=integer, default=4, metavar="N", help="default: 4")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="output file, .gif (animation) or .png (picture)"
+    )
+    parser.add_argument("--episodes", type=integer, default=4, metavar="N", help="number of episodes; default: 4")
     parser.add_argument("--seed", type=seed, default=0, help="seed of random behaviour; default: 0")
 
 
@@ -37,7 +39,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.task.behaviours import RandomBehaviour
 
     if options.policy is None and options.task is None:
-        raise UserError("render: give --task, or --policy, whose task is known")
+        raise UserError("render: give --policy or --task")
     if options.policy is not None and options.behaviour is not None:
         raise UserError("render: give either --policy or --behaviour, not both")
     check_at_least_one(options, "episodes")

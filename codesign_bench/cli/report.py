@@ -1,4 +1,4 @@
-"""`codesign-bench report`: one HTML page on everything that a results folder holds."""
+"""`codesign-bench report`: write one HTML page that summarises a results folder."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from codesign_bench.cli.arguments import DEFAULT_REPORT, add_out, add_results, a
 from codesign_bench.console import printer
 from codesign_bench.study import load_study
 
-HELP = "write one page on everything that a results folder holds"
+HELP = "write one HTML page that summarises a results folder"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the folder and the file."""
+    """Add the results folder and the output file."""
     add_study(parser)
     add_results(parser)
     add_out(parser, DEFAULT_REPORT, metavar="FILE")

@@ -1,4 +1,4 @@
-"""`codesign-bench reproduce`: run what experiments need, then draw, verify and report them."""
+"""`codesign-bench reproduce`: run the cells that experiments need, then plot, verify and report."""
 
 from __future__ import annotations
 
@@ -21,29 +21,35 @@ from codesign_bench.cli.arguments import (
 from codesign_bench.config.profiles import profile_named
 from codesign_bench.study import load_study
 
-HELP = "run what figures of a study need, then draw them"
+HELP = "run the cells that figures of a study need, then plot, verify and report"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the experiments, their size, and where results and figures go."""
+    """Add the experiments, their size, and the output folders."""
     parser.add_argument("experiments", nargs="*", metavar="FIGURE", help="names, or all (default)")
     add_study(parser)
     add_profile(parser)
-    parser.add_argument("--seeds", type=integer, metavar="N", help="seeds of every cell (default: the study's)")
+    parser.add_argument(
+        "--seeds", type=integer, metavar="N", help="number of seeds per configuration (default: the study's)"
+    )
     add_jobs(parser)
     add_out(parser, DEFAULT_RESULTS)
     parser.add_argument(
-        "--figures", type=Path, default=DEFAULT_FIGURES, metavar="DIR", help=f"default: {DEFAULT_FIGURES}"
+        "--figures",
+        type=Path,
+        default=DEFAULT_FIGURES,
+        metavar="DIR",
+        help=f"output folder of figures; default: {DEFAULT_FIGURES}",
     )
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Run, draw, verify and report; 1 if some cell failed."""
+    """Run, plot, verify and report; return 1 if a cell failed."""
     from codesign_bench.reproduce import reproduce
 
     profile_named(options.profile)  # refuses an unknown profile before anything runs
     check_at_least_one(options, "seeds", "jobs")
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does
     return reproduce(
         load_study(options.study),
         options.experiments,

@@ -25,13 +25,13 @@ from codesign_bench.errors import UserError
 
 HELP = "train and evaluate: method x task x variant x seed"
 VALUE_TYPES: Mapping[type, Callable[[str], Value]] = {float: float, int: integer, str: str}
-"""How the values of an axis are read, by their type."""
+"""How values of an axis are parsed, by their type."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the grid, the configuration, and how to run it."""
+    """Add the grid of cells, their configuration, and how to run them."""
     parser.add_argument(
-        "--method", required=True, nargs="+", metavar="M", help="names, all (the paper's five) or beyond (all others)"
+        "--method", required=True, nargs="+", metavar="M", help="names, all (the paper's five), or beyond (all others)"
     )
     parser.add_argument("--task", required=True, nargs="+", metavar="T", help="names, or all")
     parser.add_argument("--seeds", default="1", help="a count (6 is 0-5), a list (0,3,5) or a range (2-4); default: 1")
@@ -46,26 +46,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="extend",
         default=[],
         metavar="AXIS=VALUE,...",
-        help="vary an axis, e.g. one that a study adds",
+        help="vary an axis, e.g. one that a study or a package defines",
     )
     add_jobs(parser)
-    parser.add_argument("--device", choices=DEVICES, help="where networks are updated; default: cpu")
+    parser.add_argument("--device", choices=DEVICES, help="device for network updates; default: cpu")
     parser.add_argument(
-        "--precision", choices=PRECISIONS, help="auto: bfloat16 updates where the processor supports it; default: fp32"
+        "--precision", choices=PRECISIONS, help="auto: bfloat16 updates if the processor supports them; default: fp32"
     )
     add_out(parser, DEFAULT_RESULTS)
-    parser.add_argument("--backend", default="loky", choices=("loky", "dask"), help="default: loky, this machine")
+    parser.add_argument(
+        "--backend", default="loky", choices=("loky", "dask"), help="loky (default): this machine; dask: a cluster"
+    )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="address of a running Dask scheduler (default: start a local cluster)"
     )
     parser.add_argument("--retry-failed", action="store_true", help="run failed cells again")
 
 
-# Imports that need pandas or torch stand where they are used, so that `list` and `--help` need neither.
+# Modules that import pandas or torch are imported inside functions, so that `list` and `--help` need neither.
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Run the grid; 0 if all of its cells are done in the end, 1 if some failed."""
+    """Run the grid; return 0 if all of its cells are done, 1 if some failed."""
     from codesign_bench.cell.cell import resolve_cells
     from codesign_bench.cell.grid import grid, parse_seeds, variants_of
     from codesign_bench.sweep.runner import run_sweep
@@ -83,7 +85,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     resolved = resolve_cells(list(cells))
     for device in {cell.config.run.device for cell in resolved}:
         _check_device(device)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does
     return run_sweep(
         resolved,
         options.out,
@@ -96,7 +98,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def axis_values(options: argparse.Namespace) -> dict[str, list[Value]]:
-    """Return the values that each axis takes: those of its own option, then those of `--variant`.
+    """Return the requested values of each axis: those of its own option, then those of `--variant`.
 
     Raises:
         UserError: an unknown axis, or a value of the wrong type.
@@ -111,7 +113,10 @@ def axis_values(options: argparse.Namespace) -> dict[str, list[Value]]:
 
 
 def overrides(options: argparse.Namespace) -> list[str]:
-    """Return the `--set` entries, and those that `--device` and `--precision` stand for, where a method has any use."""
+    """Return the `--set` entries and those that `--device` and `--precision` stand for.
+
+    `--precision` is dropped if none of the methods has this setting.
+    """
     from dataclasses import fields
 
     from codesign_bench.machine import computes_in_bfloat16
@@ -129,9 +134,13 @@ def overrides(options: argparse.Namespace) -> list[str]:
 
 
 def _check_device(device: str) -> None:
-    """Refuse a GPU that is not there: `--device` and `--set device` alike."""
+    """Check that a requested GPU is available, for `--device` and for `--set device`.
+
+    Raises:
+        UserError: it is not.
+    """
     if device == "cuda":
         import torch
 
         if not torch.cuda.is_available():
-            raise UserError("--device cuda: torch finds no such device here; choose cpu")
+            raise UserError("--device cuda: torch finds no CUDA device on this machine; choose cpu")

@@ -1,4 +1,4 @@
-"""`codesign-bench show`: the resolved configuration, every value with its source."""
+"""`codesign-bench show`: print the resolved configuration, every value with its source."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from rich.console import Console
 
 from codesign_bench.cli.arguments import add_config, check_at_least_one
 
-HELP = "the resolved configuration, every value with its source"
+HELP = "print the resolved configuration, every value with its source"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the cell that is asked about."""
-    parser.add_argument("--method", required=True, metavar="M")
-    parser.add_argument("--task", required=True, metavar="T")
+    """Add method, task and configuration."""
+    parser.add_argument("--method", required=True, metavar="M", help="a name that `list` shows")
+    parser.add_argument("--task", required=True, metavar="T", help="a name that `list` shows")
     add_config(parser)
 
 

@@ -1,4 +1,4 @@
-"""`codesign-bench status`: what a results folder holds and how far it is."""
+"""`codesign-bench status`: list the cells in a results folder and their progress."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import find_cells
 from codesign_bench.storage.status import status_row
 
-HELP = "what a results folder holds and how far it is"
+HELP = "list the cells in a results folder and their progress"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the folder."""
+    """Add the results folder."""
     add_results(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Print one line per cell, the counts, and why cells failed."""
+    """Print one line per cell, the counts, and the errors of failed cells."""
     print_status(console, options.results)
     return 0
 
 
 def print_status(console: Console, out: Path) -> None:
-    """Print one line per cell below `out`, the counts, and why cells failed.
+    """Print one line per cell below `out`, the counts, and the errors of failed cells.
 
     Raises:
-        UserError: there is no such folder, or no cell in it.
+        UserError: the folder does not exist, or contains no cells.
     """
     cells, log = list(find_cells(out)), printer(console)
     if not cells:
-        raise UserError(f"no cells in '{out}' yet; make some with: codesign-bench run --out {out}")
+        raise UserError(f"no cells in '{out}' yet; run some with: codesign-bench run --out {out}")
     rows = [status_row(out, cell) for cell in cells]
     print_table(console, ("cell", "status", "env_steps", "of", "return", "success"), rows)
     counts = Counter(cell.status for cell in cells)

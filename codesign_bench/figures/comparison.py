@@ -41,5 +41,5 @@ def method_of(name: str) -> str:
 
 
 def is_compared(name: str) -> bool:
-    """Tell whether a name stands for results that one's own are compared with."""
+    """Return whether a name stands for results that one's own are compared with."""
     return FROM in name

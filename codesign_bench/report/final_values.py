@@ -191,5 +191,5 @@ def _range(values: pd.Series) -> str:
 
 
 def _agree(env_steps: pd.Series) -> bool:
-    """Tell whether environment steps are those of one budget."""
+    """Return whether environment steps are those of one budget."""
     return bool(env_steps.max() - env_steps.min() <= SAME_BUDGET * env_steps.max())

@@ -71,7 +71,7 @@ def cell_lock(folder: Path) -> filelock.BaseFileLock:
 
 
 def is_locked(folder: Path) -> bool:
-    """Tell whether some process is running the cell in `folder` now."""
+    """Return whether some process is running the cell in `folder` now."""
     if not (folder / LOCK_FILE).exists():
         return False
     lock = cell_lock(folder)

@@ -12,7 +12,7 @@ import pytest
 from codesign_bench.claims import comparison
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, Lacking
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, InsufficientData
 from evidence import OTHER, OURS, TASK, curves, finals, found
 
 
@@ -93,16 +93,16 @@ def test_steps_lie_on_the_line_between_two_evaluations() -> None:
 
 @pytest.mark.parametrize("rule", [HIGHER, FEWER])
 def test_unequal_budgets_are_not_compared(rule: Rule) -> None:
-    with pytest.raises(Lacking, match="budgets differ on push: 100 and 200 environment steps"):
+    with pytest.raises(InsufficientData, match="budgets differ on push: 100 and 200 environment steps"):
         found(rule, two_methods((1.0, 1.0, 1.0), (0.0, 0.0, 0.0), budget=200))
     assert found(rule, two_methods((1.0, 1.0, 1.0), (0.1, 0.1, 0.1), budget=109)).verdict == SUPPORTED
 
 
 @pytest.mark.parametrize("rule", [HIGHER, FEWER])
 def test_two_seeds_are_not_enough(rule: Rule) -> None:
-    with pytest.raises(Lacking, match="2 finished seeds of push/cma_rl/default; 3 are needed"):
+    with pytest.raises(InsufficientData, match="2 finished seeds of push/cma_rl/default; 3 are needed"):
         found(rule, two_methods((1.0, 1.0, 1.0), (0.0, 0.0)))
-    with pytest.raises(Lacking, match="0 finished seeds of push/gnn_ppo/default"):
+    with pytest.raises(InsufficientData, match="0 finished seeds of push/gnn_ppo/default"):
         found(rule, Evidence())
 
 
@@ -140,7 +140,7 @@ def test_losing_on_all_tasks_contradicts() -> None:
 
 
 def test_a_claim_about_all_tasks_needs_all_tasks() -> None:
-    with pytest.raises(Lacking, match="scoop"):
+    with pytest.raises(InsufficientData, match="scoop"):
         found(ACROSS, two_methods((1.0, 1.2, 1.4), (0.5, 0.6, 0.7)))
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from codesign_bench.claims import deployment
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Lacking
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, InsufficientData
 from evidence import found
 
 OWN = deployment.own_instance_solved("fetch_cube", "gnn_ppo", tools=4, trials=5)
@@ -47,11 +47,11 @@ def test_every_tool_must_succeed_in_most_of_its_trials() -> None:
 
 
 def test_too_few_tools_or_trials_say_nothing() -> None:
-    with pytest.raises(Lacking, match="3 tools of fetch_cube"):
+    with pytest.raises(InsufficientData, match="3 tools of fetch_cube"):
         found(OWN, own(5, 5, 5))
-    with pytest.raises(Lacking, match="4 trials of a tool"):
+    with pytest.raises(InsufficientData, match="4 trials of a tool"):
         found(OWN, own(4, 4, 4, 4, trials=4))
-    with pytest.raises(Lacking, match="0 tools"):
+    with pytest.raises(InsufficientData, match="0 tools"):
         found(OWN, Evidence())
 
 
@@ -66,8 +66,8 @@ def test_a_tool_that_solves_all_that_any_solves_contradicts() -> None:
 
 
 def test_a_grid_that_nobody_solves_or_that_is_incomplete_says_nothing() -> None:
-    with pytest.raises(Lacking, match="no tool solves any start"):
+    with pytest.raises(InsufficientData, match="no tool solves any start"):
         found(GRID, grid([], [], [], []))
     whole = grid([0], [1], [2], [3])
-    with pytest.raises(Lacking, match="8 starts of the grid"):
+    with pytest.raises(InsufficientData, match="8 starts of the grid"):
         found(GRID, Evidence(deployment=whole.deployment.query("row < 2")))

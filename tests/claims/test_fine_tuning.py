@@ -10,7 +10,7 @@ import pytest
 
 from codesign_bench.claims import fine_tuning
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, Lacking
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, InsufficientData
 from evidence import OURS, TASK, curves, finals, found
 
 WINS = fine_tuning.fine_tuning_wins(TASK, OURS, 2, ())
@@ -59,7 +59,7 @@ def test_the_mean_along_a_curve_weighs_unequal_steps() -> None:
 
 def test_fine_tuning_needs_learning_from_scratch_to_compare_with() -> None:
     evidence = one_instance([QUICK] * 3, [SLOW] * 2)
-    with pytest.raises(Lacking, match="2 finished seeds of push/gnn_ppo/scratch-2"):
+    with pytest.raises(InsufficientData, match="2 finished seeds of push/gnn_ppo/scratch-2"):
         found(WINS, evidence)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from codesign_bench.claims import tools
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, Lacking
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, InsufficientData
 from evidence import OURS, TASK, cells, found
 
 VARY = tools.tools_vary(TASK, OURS, 6)
@@ -59,7 +59,7 @@ def test_parameters_count_in_widths_of_their_ranges() -> None:
 
 
 def test_a_task_that_is_not_known_is_lacking() -> None:
-    with pytest.raises(Lacking, match="'push' is not known"):
+    with pytest.raises(InsufficientData, match="'push' is not known"):
         found(VARY, Evidence(evaluations=designs([(0.0,)] * 3).evaluations))
 
 
@@ -89,9 +89,9 @@ def test_a_tool_that_solves_all_that_can_be_solved_contradicts() -> None:
 
 
 def test_few_tools_or_goals_say_nothing_of_tools_at_large() -> None:
-    with pytest.raises(Lacking, match="4 tools and 2 goals"):
+    with pytest.raises(InsufficientData, match="4 tools and 2 goals"):
         found(NO_SINGLE, tried([(1, 0), (0, 1)], copies=2))
-    with pytest.raises(Lacking, match="50 tools and 1 goals"):
+    with pytest.raises(InsufficientData, match="50 tools and 1 goals"):
         found(NO_SINGLE, tried([(1, 0), (0, 0)]))
-    with pytest.raises(Lacking, match="not measured"):
+    with pytest.raises(InsufficientData, match="not measured"):
         found(NO_SINGLE, Evidence())

@@ -10,7 +10,7 @@ import pytest
 
 from codesign_bench.claims import tradeoff
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, Lacking
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, InsufficientData
 from evidence import OURS, TASK, cells, found
 
 ALPHAS = (0.0, 0.3, 0.7)
@@ -74,5 +74,5 @@ def test_in_order_asks_every_step_to_go_down(values: Sequence[Sequence[float]], 
 def test_a_seed_that_never_moves_has_no_ratio() -> None:
     still = traded(dict(zip(ALPHAS, (HIGH, MIDDLE, LOW), strict=True)), effort=0.0)
     for rule in (RATIO_FALLS, IN_ORDER):
-        with pytest.raises(Lacking, match="never moves"):
+        with pytest.raises(InsufficientData, match="never moves"):
             found(rule, still)

@@ -15,7 +15,15 @@ import pytest
 from builders import rising, store_cell
 from codesign_bench.claims.claim import Claim, Rule
 from codesign_bench.claims.evidence import Evidence, load_evidence
-from codesign_bench.claims.finding import CONTRADICTED, NOT_ASKED, SUPPORTED, UNDECIDED, VERDICTS, Finding, Lacking
+from codesign_bench.claims.finding import (
+    CONTRADICTED,
+    NOT_ASKED,
+    SUPPORTED,
+    UNDECIDED,
+    VERDICTS,
+    Finding,
+    InsufficientData,
+)
 from codesign_bench.claims.verify import as_json, as_markdown, judge, missing, summary
 from codesign_bench.cli import main
 from codesign_bench.cli.program import build_parser
@@ -57,7 +65,7 @@ def claim(name: str, finding: Finding | None) -> Claim:
 
     def found(evidence: Evidence, rng: np.random.Generator) -> Finding:
         if finding is None:
-            raise Lacking("nothing there")
+            raise InsufficientData("nothing there")
         return finding
 
     return Claim(

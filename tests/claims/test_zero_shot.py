@@ -11,7 +11,7 @@ import pytest
 from codesign_bench.claims import zero_shot
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, Lacking
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, InsufficientData
 from evidence import OURS, TASK, cells, found
 
 FRACTIONS = (0.1, 0.4, 0.9)
@@ -55,15 +55,15 @@ def test_unseen_instances_are_close_if_they_keep_nine_tenths(
 
 
 def test_a_policy_that_learned_nothing_is_nothing_to_compare_with() -> None:
-    with pytest.raises(Lacking, match="nothing was learned"):
+    with pytest.raises(InsufficientData, match="nothing was learned"):
         found(CLOSE, cutouts({0.1: (1.0, 1.0, 1.0)}, seen=-0.1))
 
 
 def test_a_cutout_without_instances_is_lacking() -> None:
     evidence = cutouts({0.1: (1.0, 1.0, 1.0)})
-    with pytest.raises(Lacking, match="no instances both in and outside"):
+    with pytest.raises(InsufficientData, match="no instances both in and outside"):
         found(CLOSE, Evidence(evaluations=evidence.evaluations.assign(in_cutout=0.0)))
-    with pytest.raises(Lacking, match=r"cutout-0\.10"):
+    with pytest.raises(InsufficientData, match=r"cutout-0\.10"):
         found(CLOSE, Evidence(evaluations=evidence.evaluations.drop(columns="in_cutout")))
 
 
@@ -100,7 +100,7 @@ def test_a_gentle_fall_loses_less_than_half_at_a_step(last: Sequence[float], ver
 
 @pytest.mark.parametrize("rule", [FALLS, GENTLY])
 def test_a_trend_needs_three_fractions(rule: Rule) -> None:
-    with pytest.raises(Lacking, match=r"2 finished seeds of push/gnn_ppo/cutout-0.40"):
+    with pytest.raises(InsufficientData, match=r"2 finished seeds of push/gnn_ppo/cutout-0.40"):
         found(rule, cutouts({0.1: (9.0, 9.0, 9.0), 0.4: (8.0, 8.0), 0.9: (7.0, 7.0, 7.0)}))
 
 
@@ -132,7 +132,7 @@ def test_instances_outside_the_region_are_solved_by_more_than_half(
     rule = zero_shot.outside_solved(TASK, OURS, "")
     finding = found(rule, Evidence(outside=cells(OURS, **columns)))
     assert (finding.verdict, finding.value, finding.n) == (verdict, pytest.approx(rate), "3 seeds, 2 instances")
-    with pytest.raises(Lacking, match="0 seeds of push/gnn_ppo measured outside"):
+    with pytest.raises(InsufficientData, match="0 seeds of push/gnn_ppo measured outside"):
         found(rule, Evidence())
-    with pytest.raises(Lacking, match="2 seeds"):
+    with pytest.raises(InsufficientData, match="2 seeds"):
         found(rule, Evidence(outside=cells(OURS, **columns).query("seed < 2")))

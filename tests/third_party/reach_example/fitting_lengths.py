@@ -36,7 +36,7 @@ def lengths_follow_goals(evidence: Evidence, rng: np.random.Generator) -> Findin
     """Judge by the correlation of lengths and distances over evaluation instances, seed by seed.
 
     Raises:
-        Lacking: there are fewer than three finished seeds.
+        InsufficientData: there are fewer than three finished seeds.
     """
     from codesign_bench.claims.finding import Finding, above
     from codesign_bench.stats import mean_interval

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from codesign_bench.processes import EXIT_ORPHANED, THREAD_VARIABLES, end_with, thread_environment
+from codesign_bench.processes import EXIT_ORPHANED, THREAD_VARIABLES, thread_environment
 
 SLEEPER = (
     "import os, sys, time\n"
@@ -59,8 +59,3 @@ def test_an_orphan_ends_with_a_code_of_its_own_and_others_go_on() -> None:
     assert orphaned.returncode == EXIT_ORPHANED
     own = [sys.executable, "-c", SLEEPER.format(seconds=0.01), str(os.getpid())]
     assert subprocess.run(own, capture_output=True).returncode == 0
-
-
-def test_watching_the_parent_keeps_no_process_alive() -> None:
-    end_with(os.getppid())  # in this very process: it goes on as long as its parent does
-    assert os.getppid() > 0

@@ -17,6 +17,7 @@ SLEEPER = (
     "end_with(int(sys.argv[1]))\n"
     "print(os.getpid(), flush=True)\n"
     "time.sleep({seconds})\n"
+    "print('slept')\n"
 )
 """A child that would sleep, and ends with the process whose number it is given."""
 PARENT = (
@@ -50,12 +51,12 @@ def test_a_process_ends_when_its_parent_is_killed(parent: subprocess.Popen[str])
     orphan = int(parent.stdout.readline())
     os.kill(orphan, 0)  # it lives
     parent.kill()
-    assert parent.stdout.read() == "", "the pipe closes once the last process that holds it has ended"
+    assert parent.stdout.read() == "", "the pipe closes with the last process that holds it, before that has slept"
     assert parent.wait() < 0
 
 
 def test_an_orphan_ends_with_a_code_of_its_own_and_others_go_on() -> None:
-    orphaned = subprocess.run([sys.executable, "-c", SLEEPER.format(seconds=60), "1"], capture_output=True)
+    orphaned = subprocess.run([sys.executable, "-c", SLEEPER.format(seconds=60), "-1"], capture_output=True)
     assert orphaned.returncode == EXIT_ORPHANED
     own = [sys.executable, "-c", SLEEPER.format(seconds=0.01), str(os.getpid())]
     assert subprocess.run(own, capture_output=True).returncode == 0

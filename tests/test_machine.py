@@ -13,7 +13,6 @@ import pytest
 import codesign_bench
 from codesign_bench.machine import PACKAGES, available_cores, computes_in_bfloat16, host_facts, package_versions
 
-
 BOUND = pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="this system binds no process to cores")
 
 

@@ -12,11 +12,11 @@ from codesign_bench.cli import main
     [
         (["--task", "push", "--out", "push.jpg"], "pictures end in .gif or .png"),
         (["--task", "pusch", "--out", "push.png"], "unknown task 'pusch'; choose from: push"),
-        (["--out", "push.png"], "give --task, or --policy"),
+        (["--out", "push.png"], "give --policy or --task"),
         (["--policy", "x", "--behaviour", "random", "--out", "push.png"], "either --policy or --behaviour"),
         (["--task", "push", "--episodes", "0", "--out", "push.png"], "--episodes must be at least 1"),
         (["--policy", "nowhere", "--out", "push.png"], "is not a cell folder"),
-        (["--task", "push", "--out", "/proc/push.png"], "cannot write there"),
+        (["--task", "push", "--out", "/proc/push.png"], "not writable"),
     ],
 )
 def test_bad_input_gets_one_line(capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:

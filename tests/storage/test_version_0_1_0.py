@@ -81,7 +81,7 @@ def test_finished_cells_count_as_done_and_are_left_alone(
     line = f"run --method {methods} --task {task} {grid} --steps 1200 --profile quick --set {settings} --out {results}"
     assert main(line.split()) == 0
     first = capsys.readouterr().out.splitlines()[0]
-    assert first.split()[0] == first.split()[2]  # "6 cells, 6 of them done before"
+    assert first.split()[0] == first.split()[2]  # "6 cells, 6 of them already done"
     assert contents(results) == before
 
 

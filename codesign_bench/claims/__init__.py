@@ -1,5 +1,5 @@
-"""Which of the paper's findings do results support? One claim, one entry in `paper.py`; see docs/claims.md.
+"""Claims of a study and the rules that judge them on results; see docs/claims.md.
 
-`claim.py` says what a claim, its rule and its finding are, `evidence.py` what they are judged on, `rules.py` holds the
-kinds of rules, `paper.py` the paper's claims, `verify.py` judges them and writes the table.
+`claim.py` defines claim and rule, `finding.py` a rule's finding, `evidence.py` the data, `statistics.py` what several
+rules share. The other modules have the kinds of rules, and `verify.py` judges claims and writes the table.
 """

@@ -202,7 +202,10 @@ def test_the_shipped_results_decide_what_they_can() -> None:
 @pytest.mark.parametrize(
     ("damage", "told"),
     [
-        (lambda folder: (folder / "evaluation.csv").write_text("somebody,else\n1,2\n"), "values of 'return' are missing"),
+        (
+            lambda folder: (folder / "evaluation.csv").write_text("somebody,else\n1,2\n"),
+            "values of 'return' are missing",
+        ),
         (lambda folder: (folder / "evaluation.csv").write_text('a,b\n1,2,3\n"'), "cannot read a table"),
         (lambda folder: (folder / "evaluation.csv").write_text(""), "cannot read a table"),
     ],

@@ -1,4 +1,4 @@
-"""Run what experiments of a study need, then draw, verify and report them: `codesign-bench reproduce`."""
+"""Run the cells that experiments of a study need, then plot, verify and report: `codesign-bench reproduce`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from codesign_bench.study.study import Study
 from codesign_bench.sweep.runner import EXIT_ALL_DONE, run_sweep
 
 CLAIMS_FOLDER, REPORT_FILE = "claims", "report.html"
-"""Beside the folder of figures."""
+"""Next to the folder of figures."""
 
 
 def reproduce(
@@ -34,10 +34,10 @@ def reproduce(
     jobs: int | None = None,
     seeds: int | None = None,
 ) -> int:
-    """Run the missing cells of `wanted`, measure, draw, verify and report; return 0, or 1 if some cell failed.
+    """Run the missing cells of `wanted`, measure, plot, verify and report; return 0, or 1 if a cell failed.
 
     Raises:
-        UserError: bad input, or nothing at all that can be drawn.
+        UserError: bad input, or none of the figures can be drawn.
     """
     experiments, log = study.experiments_named(wanted), printer(console)
     code = EXIT_ALL_DONE
@@ -61,7 +61,7 @@ def reproduce(
 
 
 def _attempt(what: str, make: Callable[[], object], log: Log) -> bool:
-    """Do it, or say why it cannot be done, and continue; return which."""
+    """Call `make`; if it fails, log why and continue. Return whether it succeeded."""
     try:
         make()
     except UserError as error:

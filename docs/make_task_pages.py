@@ -3,9 +3,9 @@
     python docs/make_task_pages.py            write them
     python docs/make_task_pages.py --check    write nothing; fail if one of them is out of date
 
-A page has the class's docstring, section by section, with tables of what the code says: spaces, terms of the reward,
-conditions of success, the cutout, what the physics promise, constants with their sources. What only people can tell,
-measurements above all, is in docs/tasks/notes/<task>.md and comes last.
+A page has the class's docstring, section by section, with tables from the code: spaces, terms of the reward, conditions
+of success, the cutout, guarantees of the physics, constants with their sources. Hand-written notes, mainly
+measurements, are in docs/tasks/notes/<task>.md and come last.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ PAGES, NOTES = ROOT / "docs" / "tasks", ROOT / "docs" / "tasks" / "notes"
 SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
 """A title in a class's docstring, and the indented text below it."""
 SIBLING = re.compile(r"^from \.(_\w+) import", re.MULTILINE)
-"""A file that a task shares with others."""
+"""An import of a file that several tasks share."""
 WIDTH = 120
 
 
@@ -78,7 +78,7 @@ def page(task: Task) -> str:
         _table(("index", "entry", "low", "high", "unit"), _observation(task)),
         "## Goal",
         told["Goal space"],
-        "What differs between episodes, the instance:",
+        "The instance, which varies between episodes:",
         _table(("entry", "low", "high", "unit", "part"), _instance(task)),
         "## Reward",
         told["Reward"],
@@ -101,7 +101,7 @@ def page(task: Task) -> str:
 
 
 def docstring_parts(task: Task) -> tuple[str, dict[str, str]]:
-    """Return what comes before the sections of a task's docstring, and the sections by their titles."""
+    """Return the introduction of a task's docstring, and its sections by their titles."""
     text = inspect.cleandoc(str(type(task).__doc__))
     first = SECTION.search(text)
     sections = {title: _paragraphs(body) for title, body in SECTION.findall(text)}
@@ -109,7 +109,7 @@ def docstring_parts(task: Task) -> tuple[str, dict[str, str]]:
 
 
 def attribute_docs(statements: Sequence[ast.stmt]) -> dict[str, str]:
-    """Return name -> the string behind it, on one line, for the names that a module or class assigns to."""
+    """Return name -> the string after it, on one line, for the names that a module or class assigns."""
     found = {}
     for statement, after in pairwise(statements):
         target = statement.target if isinstance(statement, ast.AnnAssign) else None
@@ -119,7 +119,7 @@ def attribute_docs(statements: Sequence[ast.stmt]) -> dict[str, str]:
 
 
 def number(value: Any, unit: str = "") -> str:
-    """Return a bound or the value of a constant as text; angles are given in degrees, too."""
+    """Return a bound or the value of a constant as text; angles also in degrees."""
     if isinstance(value, Box):
         entries = zip(value.names, value.low, value.high, strict=True)
         return ", ".join(f"{name} {number(low)} to {number(high)}" for name, low, high in entries)
@@ -139,7 +139,7 @@ def _links(task: Task) -> str:
     shared = [f"tasks/{module}.py" for module in SIBLING.findall((ROOT / own).read_text(encoding="utf-8"))]
     code = ", ".join(f"[{path}](../../{path})" for path in (own, *shared, f"tasks/_scripts/{task.name}.py"))
     arm = " It can be [deployed](../deployment.md) on a simulated arm." if task.deployment else ""
-    return f"Code: {code}. Gymnasium: `{environment_id(task.name)}`. *Ours* marks what the paper leaves open.{arm}"
+    return f"Code: {code}. Gymnasium: `{environment_id(task.name)}`. *Ours* marks what the paper does not specify.{arm}"
 
 
 def _entries(space: Box) -> Iterator[tuple[str, float, float, str]]:
@@ -197,7 +197,7 @@ def _cutout(task: Task) -> Iterator[str]:
     )
     if type(task).fine_tuning_instances is not Task.fine_tuning_instances:
         told = _doc(type(task).fine_tuning_instances).removeprefix("Return ")
-        yield f"`--finetune N` tunes a policy further on one of {re.sub(r', [(][^)]*[)]', '', told)}"
+        yield f"`--finetune N` fine-tunes a policy on one of {re.sub(r', [(][^)]*[)]', '', told)}"
         rows = (map(number, instance) for instance in task.fine_tuning_instances().tolist())
         yield _table(("`--finetune`", *task.instance_space.names), ((str(n + 1), *row) for n, row in enumerate(rows)))
 
@@ -212,13 +212,13 @@ def _tradeoff(task: Task) -> str:
 
 def _promises(task: Task) -> Iterator[str]:
     if task.outcome is not None:
-        yield f"The outcome, whatever the reward: {task.outcome.name} ({task.outcome.unit})."
+        yield f"The outcome, independent of the reward: {task.outcome.name} ({task.outcome.unit})."
     if task.soundness is None:
         return
     tree = ast.parse(inspect.getsource(simulator))
     (own,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == "Soundness")
     told = attribute_docs(own.body)
-    yield "What the task promises of its physics, for any design and any control; tests hold it to that:"
+    yield "Guarantees of the physics, for any design and any control, checked by tests:"
     yield _table(
         ("promise", "limit", "meaning"), ((f"`{n}`", number(v), told[n]) for n, v in vars(task.soundness).items())
     )
@@ -227,7 +227,7 @@ def _promises(task: Task) -> Iterator[str]:
 def _constants(task: Task) -> Iterator[tuple[str, ...]]:
     own = ROOT / "tasks" / f"{task.name}.py"
     told: dict[str, str] = {}
-    for path in (*sorted(own.parent.glob("_*.py")), own):  # The task's own constants win over those that it shares.
+    for path in (*sorted(own.parent.glob("_*.py")), own):  # the task's constants override shared ones
         told |= attribute_docs(ast.parse(path.read_text(encoding="utf-8")).body)
     for name, constant in task.scene.items():
         yield f"`{name}`", number(constant.value, constant.unit), constant.unit, constant.source, told[name]
@@ -248,7 +248,7 @@ def _doc(function: Any) -> str:
 
 
 def _inside(notes: str) -> str:
-    """Return the text of notes without their title, with links as seen from the folder above."""
+    """Return the text of notes without their title, with links relative to the folder above."""
     return notes.split("\n", 1)[1].replace("](../", "](")
 
 

@@ -1,4 +1,4 @@
-"""One file, one method.
+"""One file per method.
 
 | file | method | source |
 | --- | --- | --- |
@@ -10,4 +10,4 @@
 """
 
 ORDER = ("gnn_ppo", "shared_arch", "cma_rl", "hwasp_minimal", "cma_es")
-"""The paper's five, in the paper's order: what `--method all` means."""
+"""The paper's five methods in the paper's order: the methods of `--method all`."""

@@ -1,4 +1,4 @@
-"""What our own profiles set for every PPO-based method, found by hand on tuning seeds (ours)."""
+"""Settings of our own profiles for every PPO-based method, found by hand on tuning seeds (ours)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 from codesign_bench.config.settings import Settings, sourced
 
 Tuned = Mapping[str, Mapping[str, Any]]
-"""Profile ("laptop", "quick") -> what it sets; `quick` adds to `laptop`."""
+"""Profile ("laptop", "quick") -> its settings; those of `quick` are added to those of `laptop`."""
 
 LAYERS = {"laptop": ("laptop",), "quick": ("laptop", "quick")}
-"""Profile -> the parts of a `Tuned` table that make it, later ones winning; other profiles have none."""
+"""Profile -> the parts of a `Tuned` table that it consists of; later ones override. Other profiles have none."""
 
 PPO: Tuned = {
     "laptop": {"gamma": 0.98, "final_learning_rate_fraction": 0.2},
@@ -32,7 +32,7 @@ PPO_BY_TASK: Mapping[str, Mapping[str, Any]] = {
     "scoop": {"control_log_std": -1.0},
     "scoop_3d": {"gamma": 0.99, "control_log_std": -1.5},
 }
-"""What `laptop` and `quick` set otherwise for a task, the same for every PPO-based method."""
+"""Settings of `laptop` and `quick` that differ for a task, the same for every PPO-based method."""
 
 SMALL_PPO = {"batch_size": 600, "minibatch_size": 150, "epochs": 2, "design_epochs": 2, "design_minibatch_size": 2}
 SMALL_GRAPHS = {
@@ -43,17 +43,17 @@ SMALL_GRAPHS = {
     "value_mlp": (16,),
 }
 SMALL_PERCEPTRONS = {"policy_net": (16, 16), "value_net": (16, 16)}
-"""Parts of what methods return as `small`."""
+"""Parts of `Method.small`."""
 
 
 def tuned(profile: str, table: Tuned) -> Settings:
-    """Return what `table` sets in one of our own profiles; nothing in any other."""
+    """Return the settings of `table` for one of our own profiles; none for any other."""
     layers = LAYERS.get(profile, ())
     return {key: entry for name in layers for key, entry in sourced(table[name], f"{name} profile (ours)").items()}
 
 
 def ppo_settings(profile: str, task_name: str) -> Settings:
-    """Return the optimiser settings of one of our own profiles for a task; nothing for any other profile."""
+    """Return the optimiser settings of one of our own profiles for a task; none for any other profile."""
     if profile not in LAYERS:
         return {}
     of_task = sourced(PPO_BY_TASK.get(task_name, {}), f"tuned for {task_name} (ours)")

@@ -1,4 +1,4 @@
-"""Single-trajectory baseline: CMA-ES over one design and one open-loop control sequence, whatever the goal.
+"""Single-trajectory baseline: CMA-ES over one design and one open-loop control sequence, independent of the goal.
 
 Source: the paper, section "Evaluating sample efficiency" and its table of baseline hyperparameters: "a set of design
 and control actions for an episode independent of the goal or starting task state".
@@ -31,7 +31,7 @@ class Config(EvolutionConfig):
     """Hyperparameters of `cma_es`."""
 
     episodes_per_candidate: int = field(default=4, metadata={"source": "ours; the paper is silent"})
-    """Instances on which a candidate's return is averaged; a generation's candidates share them."""
+    """Number of instances over which a candidate's return is averaged, the same for all candidates of a generation."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -39,11 +39,11 @@ class Config(EvolutionConfig):
 
 
 TUNED: Tuned = {"laptop": {"sigma0": 0.3, "episodes_per_candidate": 16}, "quick": {}}
-"""What was tuned for this baseline (ours)."""
+"""Settings tuned for this baseline (ours)."""
 
 
 class OpenLoopPolicy(Policy):
-    """One design and one control per time step, whatever is observed but the elapsed time."""
+    """One design and one control per time step; only the elapsed time is read from the observation."""
 
     def __init__(self, task: Task, plan: Floats) -> None:
         size = task.design_space.size
@@ -57,8 +57,9 @@ class OpenLoopPolicy(Policy):
         return np.broadcast_to(self.designs, (*np.shape(observation)[:-1], self.designs.size)).copy()
 
     def act(self, observation: Singles) -> Singles:
-        """Return the control of the time step that the observation tells."""
+        """Return the control for the elapsed time in the observation."""
         elapsed = np.asarray(observation)[..., self.task.layout.phase.stop - 1]
+        # The elapsed fraction is stored in single precision, so it is rounded to the nearest step, not down.
         step = np.minimum(np.rint(elapsed * self.task.horizon).astype(int), self.task.horizon - 1)
         controls: Singles = self.controls[step]
         return controls
@@ -88,22 +89,24 @@ class CmaEs(Method[Config]):
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Settings:
-        """Return what was tuned for this baseline."""
+        """Return the settings tuned for this baseline."""
         return tuned(profile, TUNED)
 
     @property
     def shortest_batch(self) -> int:
-        """An episode of every candidate: they are compared on the same instances."""
+        """One episode per candidate, since candidates are compared on the same instances."""
         return self.config.popsize * super().shortest_batch
 
     def train(self, remaining_steps: int) -> BatchReport:
-        """Try one generation: every candidate on the same few instances; its fitness is the mean return.
+        """Evaluate one generation: every candidate on the same few instances, with the mean return as its fitness.
 
-        Where the budget ends, a generation plays fewer instances, but every candidate plays at least one.
+        At the end of the budget a generation plays fewer instances, but every candidate plays at least one.
         """
         config, problem = self.config, self.problem
         plans = self.evolution.ask()
         affordable = remaining_steps // (config.popsize * (problem.task.horizon + 1))
+        # All candidates get the same number of instances, and the same ones: CMA-ES uses only the ranking of
+        # candidates, which the luck of easier instances would distort.
         repeats = max(1, min(config.episodes_per_candidate, affordable))
         instances = problem.sample_instances(self.streams["instances"], repeats)
         returns, steps, solved = self._play(plans, instances)
@@ -129,7 +132,7 @@ class CmaEs(Method[Config]):
         return returns.reshape(count, repeats), int(steps.sum()), float(solved.mean())
 
     def _play_each(self, plans: Floats, instances: Floats) -> tuple[Floats, Floats, Booleans]:
-        """Return return, simulated steps and success, each (b,), of plans (b, X) on one instance (b, I) each."""
+        """Return returns, simulated steps and successes, (b,) each, of plans (b, X) on one instance (b, I) each."""
         task, slots = self.problem.task, np.arange(len(plans))
         size = task.design_space.size
         controls = plans[:, size:].reshape(len(slots), task.horizon, task.control_space.size)
@@ -147,7 +150,7 @@ class CmaEs(Method[Config]):
             return returns, steps, episodes.success(slots).copy()
 
     def policy(self) -> Policy:
-        """Return CMA-ES's mean as a policy."""
+        """Return the mean of CMA-ES as a policy."""
         return OpenLoopPolicy(self.problem.task, self.evolution.mean)
 
     @classmethod
@@ -156,9 +159,9 @@ class CmaEs(Method[Config]):
         return OpenLoopPolicy(task, tensors[PLAN])
 
     def state(self) -> State:
-        """Return CMA-ES's history."""
+        """Return the history of CMA-ES."""
         return State({"evolution.history": np.array(self.evolution.history).reshape(-1, self.config.popsize)}, {})
 
     def load_state(self, state: State) -> None:
-        """Go through CMA-ES's generations again."""
+        """Repeat the generations of CMA-ES."""
         self.evolution.replay(state.arrays["evolution.history"])

@@ -42,11 +42,11 @@ class Config(EvolutionConfig, PerceptronConfig):
 
 
 TUNED: Tuned = {"laptop": {"sigma0": 0.4}, "quick": {}}
-"""What was tuned for this baseline (ours)."""
+"""Settings tuned for this baseline (ours)."""
 
 
 class GivenDesignActor(Actor):
-    """A design that CMA-ES chooses, kept here for acting, and a perceptron that controls any design."""
+    """The design that CMA-ES has found so far, and a perceptron that controls any design."""
 
     best_design: Tensor
 
@@ -62,7 +62,7 @@ class GivenDesignActor(Actor):
         )
 
     def design(self, observation: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the best design (B, D) so far, without spread."""
+        """Return the best design (B, D) so far, with standard deviation 0."""
         return self.best_design.expand(len(observation), -1), self.design_log_std
 
     def control(self, observation: Tensor) -> tuple[Tensor, Tensor]:
@@ -70,7 +70,7 @@ class GivenDesignActor(Actor):
         return self.controller(self.features.flat(observation, self.norm)), self.control_log_std
 
     def design_parameters(self) -> list[nn.Parameter]:
-        """Return none: CMA-ES moves the design."""
+        """Return no parameters: CMA-ES optimises the design."""
         return []
 
     def control_parameters(self) -> list[nn.Parameter]:
@@ -103,7 +103,7 @@ class CmaRl(Method[Config]):
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Settings:
-        """Return PPO's settings, with what was tuned for this baseline."""
+        """Return PPO's settings, with those tuned for this baseline."""
         return {**ppo_settings(profile, task_name), **tuned(profile, TUNED)}
 
     def use_cores(self, count: int) -> None:
@@ -115,16 +115,18 @@ class CmaRl(Method[Config]):
         self.learner.use_device(name)
 
     def _candidates(self, slots: Slots) -> Singles:
-        """Give slot after slot the candidates of this generation in turn."""
+        """Assign the candidates of this generation to slots in turn."""
         designs: Singles = self.evolution.ask()[slots % self.config.popsize].astype(np.float32)
         return designs
 
     def train(self, remaining_steps: int) -> BatchReport:
-        """Play a batch with one generation of designs, improve the controller on it, and tell CMA-ES the returns.
+        """Play a batch with one generation of designs, update the controller on it, and give CMA-ES the returns.
 
-        A last batch that is too small to try every candidate trains the controller alone.
+        A last batch that is too small for every candidate trains only the controller.
         """
         report, batch = self.learner.train(remaining_steps)
+        # At the design step the sum of rewards to the end of the episode is the episode's return; summed over a slot,
+        # it is the total of all its episodes. Returns are undiscounted, as in the evaluation.
         returns = np.where(batch.is_design, episode_returns(batch.reward, batch.episode_end), 0.0).sum(axis=1)
         candidate = np.arange(len(returns)) % self.config.popsize
         episodes = np.bincount(candidate, batch.is_design.sum(axis=1), minlength=self.config.popsize)
@@ -134,7 +136,7 @@ class CmaRl(Method[Config]):
         return replace(report, metrics=report.metrics | {"sigma": self.evolution.sigma})
 
     def policy(self) -> Policy:
-        """Return CMA-ES's mean design with the controller's mean."""
+        """Return the mean design of CMA-ES with the mean of the controller."""
         return self.learner.policy()
 
     @classmethod
@@ -145,13 +147,13 @@ class CmaRl(Method[Config]):
         return ActorPolicy(actor)
 
     def state(self) -> State:
-        """Return the learner's state and CMA-ES's history."""
+        """Return the learner's state and the history of CMA-ES."""
         state = self.learner.state()
         history = np.array(self.evolution.history).reshape(-1, self.config.popsize)
         return State(state.arrays | {"evolution.history": history}, state.values)
 
     def load_state(self, state: State) -> None:
-        """Put the learner's state back and go through CMA-ES's generations again."""
+        """Restore the learner's state and repeat the generations of CMA-ES."""
         arrays = dict(state.arrays)
         self.evolution.replay(arrays.pop("evolution.history"))
         self.learner.load_state(State(arrays, state.values))

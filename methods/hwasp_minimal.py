@@ -32,7 +32,7 @@ class Config(GraphConfig):
 
 
 TUNED: Tuned = {"laptop": {"design_learning_rate": 2e-2, "design_kl_threshold": 0.3}, "quick": {}}
-"""What was tuned for this baseline (ours)."""
+"""Settings tuned for this baseline (ours)."""
 
 
 class SingleDesignActor(Actor):
@@ -80,7 +80,7 @@ class HwaspMinimal(PPOMethod[Config]):
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Settings:
-        """Return `gnn_ppo`'s settings, with what was tuned for this baseline."""
+        """Return `gnn_ppo`'s settings, with those tuned for this baseline."""
         return {**ppo_settings(profile, task_name), **tuned(profile, TUNED)}
 
     @classmethod

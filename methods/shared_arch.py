@@ -33,16 +33,16 @@ class Config(PerceptronConfig):
 
 
 TUNED: Tuned = {"laptop": {}, "quick": {}}
-"""What was tuned for this baseline (ours)."""
+"""Settings tuned for this baseline (ours)."""
 
 REFERENCE = "gnn_ppo"
-"""The method than which this one has no fewer trainable parameters, neither in its policy nor altogether (paper)."""
+"""`shared_arch` has at least as many trainable parameters as this method, in its policy and in total (paper)."""
 WIDTH_STEP = 16
-"""Layers are widened by multiples of this where the profile's widths would have fewer parameters (ours)."""
+"""Layers are widened in steps of this size until there are enough parameters (ours)."""
 
 
 class SharedActor(Actor):
-    """One trunk for both phases, which the phase, an input, tells apart; a linear head for each."""
+    """One trunk for both phases, with the phase as an input, and a linear head for each phase."""
 
     def __init__(self, task: Task, config: Config, rng: np.random.Generator) -> None:
         super().__init__()
@@ -91,15 +91,15 @@ class SharedArch(PPOMethod[Config]):
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Settings:
-        """Return `gnn_ppo`'s optimiser settings, with what was tuned for this baseline."""
+        """Return `gnn_ppo`'s optimiser settings, with those tuned for this baseline."""
         return {**ppo_settings(profile, task_name), **tuned(profile, TUNED)}
 
     @classmethod
     def derived(cls, config: Config, profile: str, task_name: str) -> Settings:
-        """Return wider layers where the profile's own would have fewer parameters than the paper's own method.
+        """Return wider layers if the profile's would have fewer parameters than the paper's own method.
 
-        The paper's table says 256 everywhere and its text that no task has fewer parameters than the paper's own
-        method; on the 3D tasks only one of them can hold. We keep the text's promise.
+        The paper's table has width 256 for every task, and its text says that there are at least as many parameters as
+        in the paper's own method. On the 3D tasks only one of the two is possible; we follow the text.
         """
         task, reference = load_task(task_name), load_method(REFERENCE)
         needed = parameter_counts(reference, task, resolve(reference, task_name, profile).method)
@@ -126,7 +126,7 @@ class SharedArch(PPOMethod[Config]):
 
 
 def parameter_counts(method_class: type[Method[Any]], task: Task, config: Any) -> tuple[int, int]:
-    """Return how many parameters a PPO-based method trains: those of its policy, and those of all its networks."""
+    """Return the numbers of trainable parameters of a PPO-based method: of its policy, and of all its networks."""
     assert issubclass(method_class, PPOMethod)
     rng = np.random.default_rng(0)
     policy, value = (

@@ -1,4 +1,4 @@
-"""Curves of every method on every task over environment steps: what the learning-curve figures share."""
+"""Curves of every method on every task over environment steps, shared by the learning-curve figures."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ PANELS_PER_ROW = 3
 PANEL_HEIGHT = 1.5
 """Height of a panel, in inches."""
 SLIVER = 0.05
-"""Largest part of a curve's length that counts as too short to see."""
+"""Fraction of a curve's length below which a piece is too short to see."""
 NEEDED = ("env_steps", "task", "method", "variant", "seed", *QUANTITIES)
 
 
 def evaluated_rows(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the evaluated rows of the variant `default` of a frame as `codesign_bench.load_results` gives it.
+    """Return the evaluated rows of the variant `default` of a frame from `codesign_bench.load_results`.
 
     Raises:
         UserError: a column, or every row of the default variant, is missing.
@@ -46,9 +46,9 @@ def draw_curves(table: pd.DataFrame, labels: dict[str, str], note: str) -> Figur
 
     Args:
         table: columns task, method, quantity (a key of `QUANTITIES`), env_steps, centre, low, high (NaN where there is
-            no interval), seeds (how many reached this step).
-        labels: names of methods in the legend, where they differ from the method's.
-        note: what lines and bands are.
+            no interval), seeds (the number that reached this step).
+        labels: names of methods in the legend, if they differ from the method's.
+        note: explanation of lines and bands.
     """
     styles = line_styles(table["method"])
     tasks = task_order(table["task"])
@@ -69,12 +69,12 @@ def draw_curves(table: pd.DataFrame, labels: dict[str, str], note: str) -> Figur
         for axis in axes.flat:
             axis.set_visible(axis.has_data())
         _add_legend(figure, table, labels, note, columns=_legend_columns(table, narrow))
-        figure.draw_without_rendering()  # ticks take their settings when first drawn, which must be before leaving
+        figure.draw_without_rendering()  # ticks take their settings when first drawn, so within these settings
     return figure
 
 
 def method_labels(frame: pd.DataFrame) -> dict[str, str]:
-    """Return the legend's names of the methods, where the frame gives any."""
+    """Return the legend's names of the methods, if the frame has any."""
     if "label" not in frame.columns:
         return {}
     known = frame.dropna(subset=["label"]).drop_duplicates("method")
@@ -83,7 +83,7 @@ def method_labels(frame: pd.DataFrame) -> dict[str, str]:
 
 def _draw_panel(axes: Axes, curves: pd.DataFrame, quantity: str, styles: dict[str, tuple[str, Dashes]]) -> None:
     """Draw one quantity of one task."""
-    for method in reversed(in_order(curves["method"])):  # the paper's own method lies on top
+    for method in reversed(in_order(curves["method"])):  # the paper's own method on top
         draw_curve(axes, curves[curves["method"] == method], *styles[method], gid=method)
     axes.set_xlabel("environment steps")
     axes.set_ylabel(QUANTITIES[quantity])
@@ -94,10 +94,10 @@ def _draw_panel(axes: Axes, curves: pd.DataFrame, quantity: str, styles: dict[st
 
 
 def draw_curve(axes: Axes, curve: pd.DataFrame, colour: str, dashes: Dashes, gid: str) -> None:
-    """Draw one line and its band; where some seeds are missing, the line is dotted.
+    """Draw one line and its band; the line is dotted where some seeds are missing.
 
     Args:
-        curve: columns env_steps, centre, low, high (NaN where there is no interval), seeds (how many got this far).
+        curve: columns env_steps, centre, low, high (NaN without interval), seeds (the number that reached this step).
         gid: names the line in a test or an SVG.
     """
     curve = _without_slivers(curve)
@@ -105,7 +105,7 @@ def draw_curve(axes: Axes, curve: pd.DataFrame, colour: str, dashes: Dashes, gid
     steps, values = curve["env_steps"], curve["centre"]
     axes.plot(steps, values.where(complete), color=colour, linestyle=dashes, gid=gid)
     if not complete.all():
-        # The dotted stretches start and end on the solid ones.
+        # Dotted pieces start and end on solid ones.
         dotted = ~complete | ~complete.shift(-1, fill_value=True) | ~complete.shift(1, fill_value=True)
         axes.plot(steps, values.where(dotted), color=colour, linestyle=":", gid=f"{gid} (fewer seeds)")
     if curve["low"].notna().any():
@@ -113,10 +113,10 @@ def draw_curve(axes: Axes, curve: pd.DataFrame, colour: str, dashes: Dashes, gid
 
 
 def _without_slivers(curve: pd.DataFrame) -> pd.DataFrame:
-    """Cut off ends of a curve that some seeds lack and that are too short to see.
+    """Cut off ends of a curve that not all seeds reach and that are too short to see.
 
-    Seeds end on whole batches of whole episodes, so their last evaluations lie a few steps apart; the few that
-    went farthest would stand as a spike at the end of the line. Tables keep these rows.
+    Batches consist of whole episodes, so the last evaluations of seeds are a few steps apart. The few seeds with the
+    most steps would appear as a spike at the end of the line. Tables keep these rows.
     """
     steps = curve["env_steps"]
     complete = steps[curve["seeds"] == curve["seeds"].max()]
@@ -138,7 +138,7 @@ def _add_legend(figure: Figure, table: pd.DataFrame, labels: dict[str, str], not
 
 
 def _legend_columns(table: pd.DataFrame, narrow: bool) -> int:
-    """Return how many entries of the legend stand side by side."""
+    """Return the number of columns of the legend."""
     return 2 if narrow or _compares(table) else 3
 
 

@@ -1,4 +1,4 @@
-"""The order of tasks in figures: that of listings."""
+"""The order of tasks in figures, the same as in listings."""
 
 from __future__ import annotations
 
@@ -15,6 +15,6 @@ def task_order(tasks: Iterable[str]) -> list[str]:
 
 
 def in_task_order(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of a frame with a column `task` in that order; rows of one task keep theirs."""
+    """Return the rows of a frame with a column `task` in this order; the order within a task is kept."""
     rank = {name: position for position, name in enumerate(task_order(frame["task"]))}
     return frame.sort_values("task", key=lambda tasks: tasks.map(rank), kind="stable").reset_index(drop=True)

@@ -1,4 +1,4 @@
-"""How pictures of scenes stand in figures: cut to what matters, in a frame, without axes."""
+"""Pictures of scenes in figures: cropped to the relevant part, with a frame and without axes."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ Picture: TypeAlias = NDArray[np.uint8]
 """(height, width, 3) in RGB."""
 
 MARGIN = 0.04
-"""Around what is kept, as a share of the picture's longer side."""
+"""Margin around the kept part, as a fraction of the picture's longer side."""
 MOST_CUT = 0.3
-"""Largest share of a single picture's width or height that is cut off; more would show its pixels."""
+"""Largest fraction of a picture's width or height that is cut off; more would make pixels visible."""
 SAME = 12
-"""Colours that differ by less in every channel count as the same; rendering is not exact."""
+"""Colours count as equal if every channel differs by less than this; rendering is not exact."""
 FRAME_COLOUR, FRAME_WIDTH = "#999999", 0.5
 
 
 def cut_to_differences(pictures: Sequence[Picture], *, aspect: float = 4 / 3) -> list[Picture]:
-    """Cut all pictures alike to the part in which any of them differs from the first; all of it where none does.
+    """Crop all pictures to the part in which any of them differs from the first; to the whole if none does.
 
     Args:
-        pictures: of one size.
-        aspect: width over height of the result, as far as the pictures allow.
+        pictures: pictures of the same size.
+        aspect: width / height of the result, as far as possible.
     """
     stack = np.stack(pictures).astype(np.int16)
     rows, columns = _box((np.abs(stack - stack[0]).max(axis=-1) > SAME).any(axis=0), aspect)
@@ -34,9 +34,9 @@ def cut_to_differences(pictures: Sequence[Picture], *, aspect: float = 4 / 3) ->
 
 
 def cut_to_content(picture: Picture, *, aspect: float = 4 / 3) -> Picture:
-    """Cut off margins in the colour of the picture's upper left corner, but no more than `MOST_CUT`.
+    """Cut off margins in the colour of the picture's upper left corner, at most `MOST_CUT`.
 
-    What is then higher than `aspect` (width over height) allows loses top and bottom alike.
+    If the result is too high for `aspect` (width / height), it loses the same amount at top and bottom.
     """
     difference = np.abs(picture.astype(np.int16) - picture[0, 0].astype(np.int16)).max(axis=-1)
     rows, columns = _box(difference > SAME, aspect)
@@ -59,7 +59,7 @@ def show(axes: Axes, picture: Picture) -> Any:
 
 
 def _box(mask: NDArray[np.bool_], aspect: float) -> tuple[slice, slice]:
-    """Return rows and columns of the smallest box of the wanted shape around what is set, with a margin."""
+    """Return rows and columns of the smallest box with this aspect around the mask, with a margin."""
     height, width = mask.shape
     if not mask.any():
         return slice(0, height), slice(0, width)
@@ -75,7 +75,7 @@ def _box(mask: NDArray[np.bool_], aspect: float) -> tuple[slice, slice]:
 
 
 def _widen(start: int, stop: int, length: int, size: int) -> slice:
-    """Return a stretch of at least `length` around start..stop that stays within `size`."""
+    """Return a slice of at least `length` around start..stop, within `size`."""
     length = min(max(length, stop - start), size)
     first = min(max(0, (start + stop - length) // 2), size - length)
     return slice(first, first + length)

@@ -1,4 +1,4 @@
-"""How every figure looks: fixed colours, sizes for a two-column paper, and a backend that needs no display.
+"""The style of all figures: fixed colours, sizes for a two-column paper, and a backend that needs no display.
 
 Colours are those of Okabe and Ito (2008), which readers with any common colour blindness can tell apart.
 """
@@ -29,10 +29,10 @@ COLOURS = {
 """Colour of each of the paper's five methods, in the order of its legends."""
 
 OTHER_COLOURS = ("#56B4E9", "#000000", "#999999")
-"""Colours of all other methods, in turn; where they run out, the dashes change."""
+"""Colours of all other methods, in turn; after the last, the dashes change."""
 
 BLUE, ORANGE, GREEN, RED, PINK, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#999999"
-"""The same palette for whatever is no method."""
+"""The same palette for everything other than methods."""
 
 DASHES: tuple[Dashes, ...] = ("-", "--", "-.")
 
@@ -72,7 +72,7 @@ def in_order(methods: Iterable[str]) -> list[str]:
 
 
 def line_styles(methods: Iterable[str]) -> dict[str, tuple[str, Dashes]]:
-    """Return (colour, dashes) for each method; those of the paper's five never depend on what else is drawn.
+    """Return (colour, dashes) for each method; those of the paper's five do not depend on other methods.
 
     Compared results have their method's colour and are dashed.
     """
@@ -91,14 +91,14 @@ def line_styles(methods: Iterable[str]) -> dict[str, tuple[str, Dashes]]:
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Draw with the settings of this module, whatever the user's own are."""
+    """Draw with the settings of this module instead of the user's."""
     settings: dict[Any, Any] = {**mpl.rcParamsDefault, **SETTINGS, "backend": "Agg"}
     with mpl.rc_context(settings):
         yield
 
 
 def draw_table(axes: Axes, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Fill `axes` with a table of texts, columns as wide as they need to be."""
+    """Fill `axes` with a table of texts, with column widths that fit the texts."""
     axes.axis("off")
     table = axes.table(rows, colLabels=header, loc="center", edges="horizontal", cellLoc="right")
     table.auto_set_font_size(False)

@@ -12,17 +12,17 @@ NEEDED = (
     *("task", "title", "method", "label", "variant", "alpha", "seed", "instance", "success"),
     *("row", "column", "across", "up", "goal", "picture"),
 )
-"""Columns of a frame of tools, as `codesign_bench.figures.designed_tools` makes it."""
+"""Columns of a frame of tools from `codesign_bench.figures.designed_tools`."""
 
 UNSOLVED_COLOUR, UNSOLVED_WIDTH = RED, 1.5
-UNSOLVED_NOTE = "thick frame: the episode that followed did not succeed"
+UNSOLVED_NOTE = "thick frame: the episode with this tool did not succeed"
 HEADER_HEIGHT = 0.36
 """Room for title and labels, in inches."""
 FONT_SIZE = 5.5
 
 
 def cut_alike(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows with all pictures of a task cut to the part in which any of them differs."""
+    """Return the rows with all pictures of a task cropped to the part in which they differ."""
     pictures = pd.Series(index=rows.index, dtype=object)
     for _, own in rows.groupby("task"):
         pictures[own.index] = pd.Series(cut_to_differences(list(own["picture"])), index=own.index)
@@ -30,7 +30,7 @@ def cut_alike(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def is_map(grid: pd.DataFrame) -> bool:
-    """Return whether pictures stand by two entries of their goals; otherwise they make a row in one entry."""
+    """Return whether pictures are arranged by two entries of their goals; otherwise by one entry, in a row."""
     return bool(grid["up"].iloc[0])
 
 

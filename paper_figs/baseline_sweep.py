@@ -1,4 +1,4 @@
-"""The sweep over the settings of the CMA-ES baseline, with the chosen values beside the paper's (its appendix)."""
+"""The sweep over the settings of the CMA-ES baseline, with our best values and the paper's (its appendix)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PARAMETERS = {
     "rank_mu_learning_rate": "rank-mu learning rate",
     "rank_one_learning_rate": "rank-one learning rate",
 }
-"""Columns that were swept and their names on the axes, as in the paper's table."""
+"""Swept columns and their names on the axes, as in the paper's table."""
 NEEDED = (*PARAMETERS, "rung", "budget", "paper_best", "env_steps", "return_mean", "kept")
 CHOSEN_COLOUR, PAPER_COLOUR = RED, BLUE
 
@@ -71,7 +71,7 @@ def draw(frame: pd.DataFrame) -> Figure:
 
 
 def texts(frame: pd.DataFrame) -> dict[str, str]:
-    """Return the table of chosen values beside the paper's, in Markdown and LaTeX.
+    """Return the table of our best values and the paper's, in Markdown and LaTeX.
 
     Raises:
         UserError: as `data` does.
@@ -96,7 +96,7 @@ def _count(table: pd.DataFrame) -> int:
 
 
 def _draw_panel(axes: Axes, table: pd.DataFrame, name: str) -> None:
-    """Draw every setting's return over one parameter; values stand side by side, rungs a little apart."""
+    """Draw every setting's return over one parameter, with rungs slightly offset at each value."""
     values = sorted(set(table[name]))
     place = table[name].map({value: index for index, value in enumerate(values)}).to_numpy(dtype=float)
     rungs = int(table["rung"].max()) + 1

@@ -1,7 +1,7 @@
 """Tools and policies on a simulated robot arm (the paper's `tab:real_exp` and `fig:detailed_other_inits_results`).
 
-Above, how often each tool succeeds on the instance it was designed for and on the grid of starts, with the paper's
-real robot behind it. Below, the grid for each fetch-cube tool, seen from above with the robot's base at the bottom.
+Top: successes of each tool on the instance it was designed for and on the grid of starts, with the paper's real robot
+in brackets. Bottom: the grid of each fetch-cube tool, seen from above, with the robot's base at the bottom.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ GRID_TASK = "fetch_cube"
 SUCCESS = ("#009E73", "S", "success")
 NEAR = ("#E69F00", "n", f"failure within {100.0 * REAL_ROBOT.near_miss:.0f} cm of success")
 FAILURE = ("#D55E00", "F", "failure")
-"""Green, orange and red of Okabe and Ito (2008), with a letter each, so that nobody needs the colours."""
+"""Green, orange and red of Okabe and Ito (2008), each with a letter for readers who cannot distinguish them."""
 ROW_NAMES = {OWN: "own instance", GRID: "grid of starts"}
 NOTE = "Successes on the simulated arm (in brackets: the paper's, on the real one)"
 TABLE_HEIGHT, MAP_HEIGHT = 1.1, 1.8
@@ -44,7 +44,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return one row per task, kind of trial and tool.
 
     Args:
-        frame: one row per trial, as `codesign_bench.deployment.tables.load_deployment` gives it.
+        frame: one row per trial, from `codesign_bench.deployment.tables.load_deployment`.
 
     Returns:
         Columns task, kind, tool, successes, near (failures within 5 cm of success), trials, paper_successes,
@@ -152,7 +152,7 @@ def _success(row: pd.Series) -> str:
 
 
 def _draw_map(axes: Axes, trials: pd.DataFrame, tool: int) -> None:
-    """Draw the grid of one tool, the row farthest from the robot on top, and the base below."""
+    """Draw the grid of one tool, with the row farthest from the robot at the top and the base at the bottom."""
     rows, columns = int(trials["row"].max()) + 1, int(trials["column"].max()) + 1
     for entry in trials.to_dict("records"):
         colour, letter, _ = SUCCESS if entry["success"] else NEAR if entry["near"] else FAILURE

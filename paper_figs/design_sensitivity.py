@@ -1,7 +1,7 @@
-"""How much the tool decides: one scripted controller per task, many tools, many goals (ours).
+"""How much the tool matters: one scripted controller per task, many tools, many goals (ours).
 
-The premise of the paper's tasks: "no single tool solves all goals". Above, every tool on every goal; below, how many
-goals each random tool solves, beside the best single tool and a tool of its own for every goal.
+The premise of the paper's tasks: "no single tool solves all goals". Top: every tool on every goal. Bottom: the fraction
+of goals that each random tool solves, compared with the best single tool and with one tool per goal.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
 
     Args:
         frame: columns `NEEDED`: one row per tool and goal; `kind` is "random" or "scripted", `own` is 1 for a scripted
-            tool on the goal that it was made for.
+            tool on the goal for which it was designed.
 
     Returns:
-        Columns task, tools, goals, random_mean, random_sd (share of goals that a random tool solves), best_single
-        (share that the best of all tools solves), own (share solved by scripted tools made for them), any (share that
+        Columns task, tools, goals, random_mean, random_sd (fraction of goals that a random tool solves), best_single
+        (fraction that the best tool solves), own (fraction solved by the tools scripted for them), any (fraction that
         at least one tool solves), outcome_name, outcome_unit, outcome_low, outcome_high (5th and 95th percentile of
         the mean outcome of a random tool).
 
@@ -105,7 +105,7 @@ def _summary(name: str, rows: pd.DataFrame) -> dict[str, object]:
 
 
 def _draw_matrix(figure: Figure, axes: Axes, rows: pd.DataFrame) -> None:
-    """Draw the outcome of every tool (column, by share of goals solved) on every goal (row); a dot is a success."""
+    """Draw the outcome of every tool (column, sorted by goals solved) on every goal (row); a dot is a success."""
     outcome = rows.pivot(index="goal", columns="tool", values="outcome")
     success = rows.pivot(index="goal", columns="tool", values="success")
     tools = success.mean().sort_values(kind="stable").index
@@ -126,7 +126,7 @@ def _draw_matrix(figure: Figure, axes: Axes, rows: pd.DataFrame) -> None:
 
 
 def _draw_histogram(axes: Axes, rows: pd.DataFrame, summary: pd.Series) -> None:
-    """Draw how many random tools solve which share of the goals."""
+    """Draw a histogram of random tools over the fraction of goals that they solve."""
     share = rows[rows["kind"] == "random"].groupby("tool")["success"].mean()
     axes.hist(share, bins=list(np.linspace(0.0, 1.0, BINS + 1)), color="#999999")
     for column, (colour, dash, _) in MARKS.items():

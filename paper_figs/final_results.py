@@ -1,7 +1,8 @@
 """Final return and success of every method on every task, with intervals over seeds: the benchmark's table (ours).
 
-Numbers are means over seeds, of the last evaluation of each; seeds that stopped early are left out. Minutes are what
-the median cell took as it ran, beside others: one that had to share its core tells nothing of the method.
+Numbers are means over seeds of the last evaluation of each; seeds that stopped early are left out. Minutes are the
+median over cells as they ran, in parallel with others. The time of a cell that shared its core says nothing about the
+method.
 """
 
 from __future__ import annotations
@@ -25,21 +26,21 @@ TITLE = "Final results"
 SOURCE = curves
 NEEDS = "codesign-bench run --method all --task T --seeds 6"
 ROW_HEIGHT = 0.17
-"""Of a method in a panel, in inches."""
+"""Height of a method in a panel, in inches."""
 INTERVAL = (
     f"dot: mean over seeds (n); bar: {CONFIDENCE:.0%} bootstrap interval of the mean, if {MIN_SEEDS} seeds or more"
 )
 """The kind of interval, written on the figure."""
 DIGITS = 2
 FARTHEST_SHARE = 0.9
-"""A seed counts if it got at least this share of the steps of its method's farthest (ours)."""
+"""A seed counts if it has at least this fraction of the most steps of its method (ours)."""
 
 
 def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return one row per task and method, the same in every call.
 
     Args:
-        frame: rows as `codesign_bench.load_results` gives them; variants other than `default` are left out.
+        frame: rows of `codesign_bench.load_results`; variants other than `default` are left out.
 
     Returns:
         Columns task, method, label, seeds, env_steps (mean over seeds), then for each quantity ("return_mean",
@@ -138,7 +139,7 @@ def _range(values: pd.Series[int]) -> str:
 
 
 def _ended(table: pd.DataFrame, task: str, method: str) -> pd.DataFrame:
-    """Return the rows of the seeds that came to the end of their budget."""
+    """Return the rows of the seeds that reached the end of their budget."""
     own = table[(table["task"] == task) & (table["method"] == method)]
     return own[own["env_steps"] >= FARTHEST_SHARE * own["env_steps"].max()]
 

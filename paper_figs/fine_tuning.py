@@ -1,6 +1,6 @@
-"""Fine-tuning on starts that were never trained on, against learning them from scratch (the paper's section 5.2).
+"""Fine-tuning on held-out starts compared with training from scratch (the paper's section 5.2).
 
-The paper's claim: going on from a policy that was trained on other starts needs far fewer gradient steps.
+The paper's claim: fine-tuning a policy that was trained on other starts needs far fewer gradient steps.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the numbers that the figure shows.
 
     Args:
-        frame: rows as `codesign_bench.load_results` gives them; cells that vary something else are left out.
+        frame: rows of `codesign_bench.load_results`; cells that vary another axis are left out.
 
     Returns:
         Columns task, method, start (k), kind ("finetune" or "scratch"), gradient_steps, mean, standard_error, seeds.
@@ -54,7 +54,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def _along_gradient_steps(rows: pd.DataFrame, kind: str) -> pd.DataFrame:
-    """Return statistics over seeds along the gradient steps of cells that vary the axis `kind`, start by start."""
+    """Return statistics over seeds along the gradient steps of cells that vary the axis `kind`, per start."""
     tables = []
     for start in sorted(rows[kind].unique()):
         own = rows[rows[kind] == start].drop(columns="env_steps", errors="ignore")
@@ -94,7 +94,7 @@ def draw(frame: pd.DataFrame) -> Figure:
 
 
 def _draw_panel(axes: Axes, part: pd.DataFrame) -> None:
-    """Draw both kinds of one start."""
+    """Draw both curves of one start."""
     for kind, (_, colour) in KINDS.items():
         curve = part[part["kind"] == kind]
         values, error = curve["mean"], curve["standard_error"]

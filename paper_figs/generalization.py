@@ -1,8 +1,8 @@
-"""Goals and starts that were never trained on (the paper's figures `fig:interpolation_map` and `_curve`).
+"""Held-out goals and starts (the paper's figures `fig:interpolation_map` and `_curve`).
 
 The paper's claim: "As the area of the cutout region increases, the performance on unseen goals degrades gracefully and
-can still solve a significant portion of unseen tasks." Left, which starts are solved with one fraction cut out; right,
-the return by region over the fractions. Starts outside the training region are drawn where evaluations hold any.
+can still solve a significant portion of unseen tasks." Left: which starts are solved with one fraction cut out. Right:
+the return by region over the fractions. Starts outside the training region are drawn if they were evaluated.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ NEEDED = (
     *("kind", "region", "x", "y", "x_label", "y_label"),
 )
 MAP_FRACTION = 0.6
-"""The paper's fraction of the map; the nearest one of the results is drawn."""
+"""The paper's fraction in the map; the nearest fraction in the results is drawn."""
 PANEL_HEIGHT = 2.1
 """Height of a row of panels, in inches."""
 
@@ -45,7 +45,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the numbers of the right panels.
 
     Args:
-        frame: as `codesign_bench.figures.generalization` makes it; fraction 0 is training on the whole region.
+        frame: from `codesign_bench.figures.generalization`; fraction 0 is training on the whole region.
 
     Returns:
         Columns task, method, label, cutout, region, return_mean, standard_error (NaN for fewer than three seeds),
@@ -72,7 +72,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def draw(frame: pd.DataFrame) -> Figure:
-    """Return the figure: for each task and method a map of starts beside the return over the fractions.
+    """Return the figure: for each task and method, a map of starts and the return over the fractions.
 
     Raises:
         UserError: as `data` does.
@@ -96,7 +96,7 @@ def draw(frame: pd.DataFrame) -> Figure:
 
 
 def texts(frame: pd.DataFrame) -> dict[str, str]:
-    """Return the numbers of the maps as a table of their own, one row per start.
+    """Return the numbers of the maps as a separate table, one row per start.
 
     Raises:
         UserError: as `data` does.
@@ -131,7 +131,7 @@ def _map_fraction(own: pd.DataFrame) -> float:
 
 
 def _solved(own: pd.DataFrame) -> pd.DataFrame:
-    """Return one row per start: where it lies, and the share of seeds that solve it."""
+    """Return one row per start: its position, and the fraction of seeds that solve it."""
     keys = ["task", "method", "cutout", "region", "instance", "x", "y"]
     grouped = own.groupby(keys, dropna=False, as_index=False)
     return grouped.agg(solved=("success", "mean"), return_mean=("return", "mean"), seeds=("seed", "nunique")).astype(
@@ -140,7 +140,7 @@ def _solved(own: pd.DataFrame) -> pd.DataFrame:
 
 
 def _draw_map(figure: Figure, axes: Axes, own: pd.DataFrame, places: pd.DataFrame) -> None:
-    """Draw every start of one task, method and fraction, in the colour of how many seeds solve it."""
+    """Draw every start of one task, method and fraction, coloured by the fraction of seeds that solve it."""
     solved = _solved(own)
     flat = bool(solved["y"].isna().all())
     height = solved["solved"] if flat else solved["y"]
@@ -179,7 +179,7 @@ def _outline(axes: Axes, places: pd.DataFrame) -> None:
 
 
 def _shade_line(axes: Axes, places: pd.DataFrame) -> None:
-    """Shade the stretches of a line that belong to either region."""
+    """Shade the intervals of a line that belong to either region."""
     ordered = places.sort_values("x")
     for region in ("training", "cutout"):
         axes.fill_between(
@@ -188,7 +188,7 @@ def _shade_line(axes: Axes, places: pd.DataFrame) -> None:
 
 
 def _draw_returns(axes: Axes, table: pd.DataFrame) -> None:
-    """Draw the return of each region over the fraction that was cut out."""
+    """Draw the return in each region over the cutout fraction."""
     for region, (colour, dashes, marker, _) in REGIONS.items():
         own = table[table["region"] == region].sort_values("cutout")
         if len(own):

@@ -1,7 +1,7 @@
-"""The paper's tables of hyperparameters, from the configurations that the profiles `paper` and `laptop` resolve to.
+"""The paper's tables of hyperparameters, from the resolved configurations of the profiles `paper` and `laptop`.
 
-The paper has one table per task for its own method and one for the baselines. As text, so do we; the picture holds the
-rows of the paper's six tables.
+The paper has one table per task for its own method and one for the baselines; our text files have the same. The picture
+has the rows of the paper's six tables.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ NEEDED = ("task", "method", "label", "name", *PROFILES, *(f"{profile}_source" fo
 SCENE, OWN = "scene", "gnn_ppo"
 """In the column `method`: the scene, and the paper's own method."""
 LEARNER_ROWS = tuple(field.name for field in fields(LearnerTable))
-"""Rows of the paper's tables about its own method, in its order."""
+"""Rows of the paper's tables on its own method, in its order."""
 
 PRINTED: Mapping[str, str] = {
     "control_log_std": "Control Log Std.",
@@ -46,16 +46,16 @@ PRINTED: Mapping[str, str] = {
     "popsize": "Population Size",
     "sigma0": "Initial Stdev",
 }
-"""Names as the paper prints them, where they are not the field's own name."""
+"""Names printed in the paper, if they differ from the field's name."""
 ABBREVIATIONS = ("gae", "gnn", "kl", "mlp", "ppo")
 
 ROW_HEIGHT = 0.125
-"""Of a line of text in the picture, in inches."""
+"""Height of a line of text in the picture, in inches."""
 FONT_SIZE = 4.8
 NAME_SHARE = 0.17
-"""Width of the names' column, as a share of the picture."""
+"""Width of the column of names, as a fraction of the picture."""
 WRAPPED_FROM = 24
-"""Longer texts are broken in two."""
+"""Longer texts are broken into two lines."""
 ABSENT = "-"
 
 
@@ -119,7 +119,7 @@ def _printed(name: str) -> str:
 
 
 def _place(name: str) -> int:
-    """Return where a row stands in the paper's tables; what they lack comes last."""
+    """Return the position of a row in the paper's tables; other rows come last."""
     return LEARNER_ROWS.index(name) if name in LEARNER_ROWS else len(LEARNER_ROWS)
 
 
@@ -144,7 +144,7 @@ def _tables(table: pd.DataFrame) -> list[tuple[str, list[str], list[list[str]]]]
 
 
 def _common(rows: pd.DataFrame, profile: str) -> str:
-    """Return the value of one hyperparameter on most tasks, and those tasks that have another one."""
+    """Return the value of one hyperparameter on most tasks, and the tasks with a different value."""
     values = dict(zip(rows["task"], rows[profile], strict=True))
     ((usual, _), *_) = Counter(values.values()).most_common()
     others = [f"{task.replace('_', ' ')}: {value}" for task, value in values.items() if value != usual]
@@ -173,7 +173,7 @@ def _lines(row: pd.Series) -> int:
 
 
 def _draw_table(axes: Axes, title: str, part: pd.DataFrame) -> None:
-    """Draw texts with one column per task, rows as high as their texts."""
+    """Draw texts with one column per task, with row heights that fit the texts."""
     axes.axis("off")
     axes.grid(visible=False)
     tasks = [str(task).replace("_", " ") for task in part.columns]

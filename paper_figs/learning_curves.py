@@ -30,11 +30,11 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the numbers that the figure shows.
 
     Args:
-        frame: rows as `codesign_bench.load_results` gives them; variants other than `default` are left out.
+        frame: rows of `codesign_bench.load_results`; variants other than `default` are left out.
 
     Returns:
         Columns task, method, quantity ("return_mean" or "success_rate"), env_steps, mean, standard_error (NaN for
-        fewer than three seeds), seeds (how many reached this step).
+        fewer than three seeds), seeds (the number that reached this step).
 
     Raises:
         UserError: a column, or every row of the default variant, is missing.
@@ -49,7 +49,7 @@ def draw(frame: pd.DataFrame) -> Figure:
     """Return the figure: for each task a panel of returns above one of success rates, and one legend with seed counts.
 
     Args:
-        frame: rows as `codesign_bench.load_results` gives them; a column `label` names the methods in the legend.
+        frame: rows of `codesign_bench.load_results`; a column `label` names the methods in the legend.
 
     Raises:
         UserError: as `data` does.

@@ -1,6 +1,6 @@
 """Learning curves as interquartile means with bootstrap intervals over seeds (Agarwal et al. 2021).
 
-The same curves as `learning_curves`, where one seed that fails or shines pulls the mean far.
+The same curves as in `learning_curves`, but robust to single seeds with very low or high returns.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the numbers that the figure shows, the same in every call.
 
     Args:
-        frame: rows as `codesign_bench.load_results` gives them; variants other than `default` are left out.
+        frame: rows of `codesign_bench.load_results`; variants other than `default` are left out.
 
     Returns:
         Columns task, method, quantity ("return_mean" or "success_rate"), env_steps, interquartile_mean, low, high (NaN
-        for fewer than three seeds), seeds (how many reached this step).
+        for fewer than three seeds), seeds (the number that reached this step).
 
     Raises:
         UserError: a column, or every row of the default variant, is missing.
@@ -50,7 +50,7 @@ def draw(frame: pd.DataFrame) -> Figure:
     """Return the figure: for each task a panel of returns above one of success rates, and one legend with seed counts.
 
     Args:
-        frame: rows as `codesign_bench.load_results` gives them; a column `label` names the methods in the legend.
+        frame: rows of `codesign_bench.load_results`; a column `label` names the methods in the legend.
 
     Raises:
         UserError: as `data` does.

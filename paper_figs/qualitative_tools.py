@@ -1,8 +1,8 @@
-"""Tools that one designer makes for goals all over the goal space (the paper's figure `fig:qualitative_tools`).
+"""Tools of one designer for goals across the goal space (the paper's figure `fig:qualitative_tools`).
 
-The paper's claim: "The designer policy outputs a range of tools depending on the goal location", shown on push. Here is
-every task of which the results hold a finished cell. A picture shows the scene right after the design step and stands
-in its task's grid where its goal lies in the goal space.
+The paper's claim: "The designer policy outputs a range of tools depending on the goal location", shown on push. This
+figure has every task with a finished cell. A picture shows the scene right after the design step; its position in the
+task's grid is that of its goal in the goal space.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ MAPS_PER_ROW = 3
 
 
 def data(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return what each picture shows.
+    """Return the data of each picture.
 
     Args:
-        frame: as `codesign_bench.figures.designed_tools` makes it; variants other than `default` are left out.
+        frame: from `codesign_bench.figures.designed_tools`; variants other than `default` are left out.
 
     Returns:
-        The same rows without pictures, the tasks in the paper's order; columns that no row fills are left out.
+        The same rows without pictures, the tasks in the paper's order; empty columns are left out.
 
     Raises:
         UserError: a column, or every row of the default variant, is missing.

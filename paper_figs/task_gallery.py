@@ -23,7 +23,7 @@ TITLE_HEIGHT = 0.2
 
 
 def data(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return what each picture shows.
+    """Return the data of each picture.
 
     Args:
         frame: one row per task with the columns `NEEDED`.

@@ -1,7 +1,7 @@
-"""Training and inference times of the methods, beside the paper's (its table in "Computational Resources").
+"""Training and inference times of the methods, with the paper's (its table in "Computational Resources").
 
-Training times are extrapolated to the paper's 10^7 steps from what the cells took, as they ran: side by side with
-others, on whatever machine that was. Inference is one call of the policy on one observation, measured when drawn.
+Training times are extrapolated to the paper's 10^7 steps from the times of the cells as they ran, in parallel with
+others and on any machine. Inference is one call of the policy on one observation, measured when the figure is drawn.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Design against control under the trade-off reward of equation 1 (the paper's figure `fig:control_design_ratio`).
+"""Design versus control under the trade-off reward of equation 1 (the paper's figure `fig:control_design_ratio`).
 
 The paper's claim on catch balls: the ratio (d_used / d_max) / (c_used / c_max) "indeed correlates with alpha, which
-indicates that agents that are directed to prefer saving either material or energy are doing so". Here is every task and
-method with cells of `run --alpha`, and beside the ratio both of its parts.
+indicates that agents that are directed to prefer saving either material or energy are doing so". This figure has every
+task and method with cells of `run --alpha`, and in addition to the ratio both of its parts.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ PANEL_HEIGHT = 1.7
 """Height of a row of panels, in inches."""
 NOTE = (
     f"mean over seeds; bars: ± standard error, if {MIN_SEEDS} seeds or more\n"
-    r"equation 1 weighs material by $\alpha$ and effort by $1 - \alpha$"
+    r"equation 1 weights material by $\alpha$ and effort by $1 - \alpha$"
 )
 
 QUANTITIES = {
@@ -36,15 +36,15 @@ QUANTITIES = {
     "material": r"material $d_{used} / d_{max}$",
     "effort": r"effort $c_{used} / c_{max}$",
 }
-"""What is drawn, one panel each, and its name on the axis."""
+"""Quantities drawn, one panel each, and their names on the axes."""
 
 
 def data(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the numbers that the figure shows.
 
     Args:
-        frame: rows as `codesign_bench.storage.frames.load_evaluations` gives them; cells that vary anything but
-            alpha are left out. The ratio of a seed is its mean material over its mean effort (NaN where nothing moved).
+        frame: rows of `codesign_bench.storage.frames.load_evaluations`; cells that vary another axis than alpha are
+            left out. The ratio of a seed is its mean material divided by its mean effort (NaN if nothing moved).
 
     Returns:
         Columns task, method, label, quantity ("ratio", "material" or "effort"), alpha, mean, standard_error (NaN for
@@ -89,7 +89,7 @@ def draw(frame: pd.DataFrame) -> Figure:
 
 
 def _draw_panel(axes: Axes, table: pd.DataFrame, styles: dict[str, tuple[str, Dashes]]) -> None:
-    for method in reversed(in_order(table["method"])):  # the paper's own method lies on top
+    for method in reversed(in_order(table["method"])):  # the paper's own method on top
         colour, dashes = styles[method]
         own = table[table["method"] == method].sort_values("alpha")
         axes.errorbar(

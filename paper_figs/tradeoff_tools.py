@@ -1,4 +1,4 @@
-"""Tools that designers make under the trade-off reward, over alpha (the paper's figure `fig:qualitative-tradeoff`).
+"""Tools of designers under the trade-off reward, over alpha (the paper's figure `fig:qualitative-tradeoff`).
 
 The paper's finding on catch balls: "As alpha increases, the created tools have shorter links at the sides to decrease
 material usage." Every row is one designer, trained with its own alpha, over the same goals.
@@ -22,17 +22,17 @@ SOURCE = designed_tools
 NEEDS = "codesign-bench run --method M --task T --alpha 0 0.3 0.7 1"
 ALSO_NEEDED = ("material",)
 PICTURES = 6
-"""Most pictures of one designer, spread over its goals."""
+"""Largest number of pictures of one designer, spread over its goals."""
 
 
 def data(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return what each picture shows.
+    """Return the data of each picture.
 
     Args:
-        frame: as `codesign_bench.figures.designed_tools` makes it; cells that vary anything but alpha are left out.
+        frame: from `codesign_bench.figures.designed_tools`; cells that vary another axis than alpha are left out.
 
     Returns:
-        The rows drawn, without pictures, by task and alpha; columns that no row fills are left out.
+        The rows drawn, without pictures, by task and alpha; empty columns are left out.
 
     Raises:
         UserError: a column, or every cell with an alpha, is missing.
@@ -41,7 +41,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def draw(frame: pd.DataFrame) -> Figure:
-    """Return the figure: a row of tools for each task and alpha, with the share of material that they use on average.
+    """Return the figure: a row of tools for each task and alpha, with the mean fraction of material that they use.
 
     Raises:
         UserError: as `data` does.
@@ -55,7 +55,7 @@ def draw(frame: pd.DataFrame) -> Figure:
         for block, grid in zip(blocks.flat[:], grids, strict=True):
             first = grid.iloc[0]
             title = rf"{first['title']}: {first['label']}, seed {first['seed']}, $\alpha$ = {first['alpha']:g}"
-            draw_grid(block, grid, f"{title}; these use {grid['material'].mean():.2f} of the most material")
+            draw_grid(block, grid, f"{title}; mean material {grid['material'].mean():.2f} of the maximum")
         figure.supxlabel(UNSOLVED_NOTE, fontsize=5.5)
         figure.draw_without_rendering()
     return figure

@@ -1,1 +1,1 @@
-"""Speed on the machine at hand, for `codesign-bench bench`: measured side by side, never asserted in a test."""
+"""Speed on this machine, for `codesign-bench bench`: compared in the same run, never asserted in a test."""

@@ -1,6 +1,7 @@
-"""Speed of our learners beside others': one run, one machine, the same batch, minibatches, epochs and environment.
+"""Speed of our learners and others: in one run, on one machine, with the same batch, minibatches, epochs and task.
 
-Every contestant runs in a process of its own, so that its peak memory is its own; medians over repeats are given.
+Every contestant runs in a separate process, so that its peak memory is measured alone; numbers are medians over
+repeats.
 
 Shapes: `n` environment steps of a batch.
 """
@@ -36,12 +37,12 @@ from codesign_bench.task import load_task
 
 @dataclass(frozen=True)
 class Contestant:
-    """Someone who learns, and how to measure it."""
+    """A learner and its measurement."""
 
     title: str
     measure: Callable[[Workload], Speed]
     needs: str = ""
-    """A package that is not always installed."""
+    """An optional package that it needs."""
 
 
 def ours(method_name: str, precision: str = "fp32") -> Callable[[Workload], Speed]:
@@ -56,7 +57,7 @@ def ours(method_name: str, precision: str = "fp32") -> Callable[[Workload], Spee
         learner.use_cores(work.cores)
         slots = max(1, round(work.batch_size / (learner.problem.task.horizon + 1)))
         rollouts, updates = [], []
-        learner.collect(min(work.batch_size, 20 * slots), slots)  # Starts processes, fills caches.
+        learner.collect(min(work.batch_size, 20 * slots), slots)  # starts processes and fills caches
         for _ in range(work.repeats):
             started = time.perf_counter()
             batch = learner.collect(work.batch_size, slots)
@@ -72,9 +73,9 @@ def ours(method_name: str, precision: str = "fp32") -> Callable[[Workload], Spee
 
 
 def operations_per_sample(method_name: str, work: Workload) -> float:
-    """Return the floating-point operations of matrix products that one sample costs in one epoch.
+    """Return the floating-point operations of matrix products per sample and epoch.
 
-    Counted by torch on a small batch: an update of two epochs less one of a single epoch.
+    Counted by torch on a small batch: an update with two epochs minus one with a single epoch.
     """
     from torch.utils.flop_counter import FlopCounterMode
 
@@ -93,7 +94,7 @@ def operations_per_sample(method_name: str, work: Workload) -> float:
 
 
 CEILING_REPEATS = 50
-"""The best of these products is the ceiling: others of the machine's guests may slow down some of them."""
+"""Number of products; the fastest is the ceiling, since other users of the machine may slow some down."""
 
 
 def ceiling(work: Workload) -> dict[str, float]:
@@ -115,7 +116,7 @@ def ceiling(work: Workload) -> dict[str, float]:
 
 
 def contestants() -> dict[str, Contestant]:
-    """Return everyone who can be measured, by name: every method that learns by PPO, and the rivals."""
+    """Return all contestants by name: every PPO-based method, and the rivals."""
     from codesign_bench.benchmarks import rivals
     from codesign_bench.learning.ppo_method import PPOMethod
 
@@ -134,7 +135,7 @@ def contestants() -> dict[str, Contestant]:
             "stable-baselines3, our vector environment", rivals.stable_baselines3_batched, "stable_baselines3"
         ),
         "usual_way": Contestant(
-            "graph network, torch-geometric, one state a call", rivals.usual_way, "torch_geometric"
+            "graph network, torch-geometric, one state per call", rivals.usual_way, "torch_geometric"
         ),
     }
 
@@ -146,7 +147,7 @@ def bench_learner(work: Workload, names: Sequence[str], out: Path | None, consol
     """Measure the contestants `names`, print a table, and write it to `out` as JSON, if given.
 
     Raises:
-        UserError: more cores than there are, a task that is not known, or a file that cannot be written.
+        UserError: more cores than available, an unknown task, or a file that is not writable.
     """
     load_task(work.task)
     if work.cores * work.cells > available_cores():
@@ -167,7 +168,7 @@ def bench_learner(work: Workload, names: Sequence[str], out: Path | None, consol
     say(
         f"{work.task}, networks of the profile {work.profile}, batches of {work.batch_size:,}, "
         f"minibatches of {work.minibatch_size:,}, {work.epochs} epochs, "
-        f"{work.cores} core(s) a cell, {work.cells} cell(s) at once, medians of {work.repeats}; "
+        f"{work.cores} core(s) per cell, {work.cells} cell(s) at a time, medians of {work.repeats}; "
         f"matrix products: {top['fp32']:.0f} GFLOP/s in fp32, "
         f"{top['bf16']:.0f} in bf16"
     )
@@ -208,14 +209,14 @@ def _write(out: Path, work: Workload, top: Mapping[str, float], found: Mapping[s
 
 
 def _in_process(name: str, work: Workload) -> Speed:
-    """Measure a contestant in processes of its own, one for each cell; their rates are added, memory is a cell's.
+    """Measure a contestant in separate processes, one per cell; rates are added, memory is that of one cell.
 
     Raises:
         UserError: a package that it needs is not installed.
     """
     needs = contestants()[name].needs
     environment = thread_environment()
-    if needs == "stable_baselines3":  # It has no other use for more cores than torch's threads.
+    if needs == "stable_baselines3":  # it can use more cores only as torch's threads
         environment["OMP_NUM_THREADS"] = str(work.cores)
     command = [sys.executable, "-m", __name__, name, json.dumps(asdict(work))]
     pipe = subprocess.PIPE

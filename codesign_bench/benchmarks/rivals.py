@@ -1,4 +1,4 @@
-"""What our learners are compared with: stable-baselines3's PPO, and the graph network built the usual way.
+"""Baselines for the speed of our learners: stable-baselines3's PPO, and the graph network built the usual way.
 
 Shapes: `B` environments, `O` observation, `A` action, `N` nodes of the tool graph, `F` features of a node.
 """
@@ -18,7 +18,7 @@ from codesign_bench.task.envs import ToolVectorEnv, environment_id, register_env
 from codesign_bench.task.episodes import Episodes
 
 USUAL_ROLLOUT_STEPS, USUAL_MINIBATCHES = 300, 3
-"""The usual way is measured over a short stretch: it is slow."""
+"""The usual way is slow, so it is measured over few steps."""
 
 
 def stable_baselines3_alone(work: Workload) -> Speed:
@@ -63,7 +63,7 @@ def _stable_baselines3(work: Workload, environments: Any) -> Speed:
 
 
 def _batched(work: Workload) -> Any:
-    """Return our batched environments as stable-baselines3 wants them: an episode's end begins the next at once."""
+    """Return our batched environments with stable-baselines3's interface: an episode's end begins the next at once."""
     from stable_baselines3.common.vec_env import VecEnv
 
     inner = ToolVectorEnv(work.task, work.environments)
@@ -110,9 +110,9 @@ def _batched(work: Workload) -> Any:
 
 
 def usual_way(work: Workload) -> Speed:
-    """Measure graph networks as wide as ours, made of torch-geometric's layers on edge lists.
+    """Measure graph networks with the widths of ours, built from torch-geometric's layers on edge lists.
 
-    They act on one state a call; minibatches are lists of single graphs, joined for every update.
+    They act on one state per call; minibatches are lists of single graphs, joined for every update.
     """
     import torch
     from torch import nn
@@ -125,7 +125,7 @@ def usual_way(work: Workload) -> Speed:
     width = layout.goal.stop + 2 + _node_width(task)
 
     class Net(nn.Module):
-        """Linear in, graph convolutions, then a perceptron of its own for every node."""
+        """A linear input layer, graph convolutions, then a separate MLP for every node."""
 
         def __init__(self, outputs: int, index_widths: tuple[int, ...]) -> None:
             super().__init__()

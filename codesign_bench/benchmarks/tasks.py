@@ -1,7 +1,7 @@
-"""Speed of the tasks on this machine, beside the raw engine's: what the benchmark adds to the physics.
+"""Speed of the tasks on this machine, compared with the bare physics engine: the overhead of the benchmark.
 
-The engine's own share is measured within the same run: the time spent in `Simulator.advance`, which makes the engine's
-step calls and nothing else.
+The engine's share is measured within the same run: the time in `Simulator.advance`, which only makes the engine's step
+calls.
 
 Shapes: `B` slots, `C` control.
 """
@@ -25,23 +25,23 @@ from codesign_bench.task.episodes import Episodes
 
 SLOTS = 64
 HELD_STEPS = 10
-"""Random controls are drawn anew after so many steps."""
+"""Random controls are redrawn after this many steps."""
 SEED = 0
 
 
 @dataclass(frozen=True)
 class TaskSpeed:
-    """Where the time of random episodes of one task goes, in s."""
+    """Time of random episodes of one task by part, in s."""
 
     env_steps: int
-    """Control steps and design steps."""
+    """Number of control and design steps."""
     control_steps: int
     engine: float
-    """In the engine's own steps during control steps."""
+    """Time in the engine's steps during control steps."""
     control: float
-    """In control steps, the engine included."""
+    """Time in control steps, including the engine."""
     starts: float
-    """In episode starts: the scene, the design step, and whatever physics they need."""
+    """Time in episode starts: scene, design step, and their physics."""
 
     @property
     def row(self) -> tuple[str, ...]:
@@ -107,7 +107,7 @@ def measure_task(name: str, seconds: float, slots: int = SLOTS) -> TaskSpeed:
                 with starts.running():
                     episodes.begin(starting, task.sample_instances(rng, starting.size))
                     episodes.design(starting, rng.uniform(-1.0, 1.0, size=(starting.size, task.design_space.size)))
-                engine.total = before  # Physics that an episode's start needs belongs to the start.
+                engine.total = before  # physics during an episode's start counts as part of the start
                 started += starting.size
             if control_steps // slots % HELD_STEPS == 0:
                 controls = rng.uniform(-1.0, 1.0, size=controls.shape)

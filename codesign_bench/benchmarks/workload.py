@@ -1,4 +1,4 @@
-"""What is measured of a learner, on what work, and with which networks."""
+"""The workload of a speed measurement: batch, task and networks; and its result."""
 
 from __future__ import annotations
 
@@ -16,39 +16,39 @@ from codesign_bench.task import task_names
 
 
 def study_profile() -> str:
-    """Return the profile that the default study brings: its publication's networks."""
+    """Return the profile of the default study, with the networks of its publication."""
     return load_study(DEFAULT_STUDY).profiles[0].name
 
 
 @dataclass(frozen=True)
 class Workload:
-    """What every contestant does."""
+    """The workload of every contestant."""
 
     task: str = field(default_factory=lambda: task_names()[0])
     profile: str = field(default_factory=study_profile)
-    """Whose networks everyone has."""
+    """Profile of the networks of all contestants."""
     batch_size: int = 50_000
     minibatch_size: int = 2_000
     epochs: int = 10
     cores: int = 1
     cells: int = 1
-    """Processes that do the same at once, each on `cores` cores: the sweep's case."""
+    """Number of parallel processes with the same work, each on `cores` cores, as in a sweep."""
     repeats: int = 3
     environments: int = 50
-    """Of stable-baselines3; ours follow from the batch."""
+    """Number of environments of stable-baselines3; ours follows from the batch."""
 
 
 @dataclass(frozen=True)
 class Speed:
-    """What one contestant reached, as medians over the repeats."""
+    """The speed of one contestant, as medians over the repeats."""
 
     rollout: float
-    """Environment steps per second of rollouts, the policy in the loop."""
+    """Environment steps per second of rollouts, including the policy."""
     update: float
-    """Samples per second that pass through the update, forward and backward, policy and value."""
+    """Samples per second of the update, forward and backward, policy and value."""
     peak_megabytes: float
     gigaflops: float | None = None
-    """Useful floating-point operations per second of the update, 1e9; None: not counted."""
+    """Useful floating-point operations per second of the update, in 1e9; None: not counted."""
     how: str = ""
 
     def end_to_end(self, epochs: int) -> float:
@@ -57,7 +57,7 @@ class Speed:
 
 
 def configured(setting: str, work: Workload) -> Any:
-    """Return a setting of the networks, as the first method that has it gets it for the work's task and profile.
+    """Return a setting of the networks for the work's task and profile, from the first method that has it.
 
     Raises:
         LookupError: no method has it.
@@ -70,10 +70,10 @@ def configured(setting: str, work: Workload) -> Any:
 
 
 def peak_megabytes() -> float:
-    """Return the most memory that this process and the largest of its ended children ever held.
+    """Return the peak memory of this process plus that of the largest of its ended children.
 
-    The kernel's maximum in `getrusage` outlives `exec`: it may be that of the process that started this one. Where
-    /proc tells of this program alone, that is taken.
+    The maximum in `getrusage` survives `exec`, so it may be that of the parent process. On systems with /proc, the
+    maximum of only this program is used.
     """
     own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     status = Path("/proc/self/status")
@@ -83,7 +83,7 @@ def peak_megabytes() -> float:
 
 
 def together(speeds: Sequence[Speed]) -> Speed:
-    """Return what cells that ran side by side reached in all; the memory is the largest cell's."""
+    """Return the total speed of parallel cells; the memory is that of the largest cell."""
     counted = [speed.gigaflops for speed in speeds if speed.gigaflops is not None]
     return Speed(
         rollout=sum(speed.rollout for speed in speeds),

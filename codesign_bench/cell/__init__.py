@@ -1,1 +1,1 @@
-"""What one run is: a task, a method, a variant and a seed, as plain values."""
+"""Cells: a task, a method, a variant and a seed, as plain values."""

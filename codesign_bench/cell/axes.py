@@ -1,6 +1,6 @@
-"""What varying an axis means: which values it takes, and what it changes of the problem and of the configuration.
+"""Axes that cells vary: their values, and what these change in the problem and the configuration.
 
-A study adds an axis in its own file; see `Study.axes`.
+A study may define more axes; see `Study.axes`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from codesign_bench.task.episodes import Tradeoff
 
 
 class Axis:
-    """One thing that cells may vary. A subclass or an instance says what that means; by default it changes nothing."""
+    """One quantity that cells may vary. A subclass or instance defines its effect; by default there is none."""
 
     name: ClassVar[str]
     """Column of frames, part of the variant's name, option of `run`."""
@@ -28,49 +28,49 @@ class Axis:
     """Type of its values: float, int or str."""
     metavar: ClassVar[str] = "X"
     help: ClassVar[str] = ""
-    """What the option does, in one line."""
+    """Help of the option, in one line."""
     exclusive: ClassVar[str] = ""
-    """Axes that share this word are never varied together; a grid has them one after the other."""
+    """Axes with the same word here are never varied together; a grid contains each separately."""
 
     def check(self, value: Value, task: Task) -> None:
-        """Refuse a value that means nothing, or that `task` cannot have.
+        """Check that a value is valid, and possible on `task`.
 
         Raises:
-            UserError: naming the value.
+            UserError: it is not; names the value.
         """
 
     def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
-        """Return what the cell's method is asked to learn."""
+        """Return the learning problem of the cell's method."""
         return problem
 
     def overrides(self, value: Value) -> tuple[str, ...]:
-        """Return settings that the value stands for, in the form of `--set`."""
+        """Return the settings that the value implies, in the form of `--set`."""
         return ()
 
     def run_overrides(self, run: RunSettings) -> Mapping[str, tuple[Any, str]]:
-        """Return run settings that a cell has whatever the value, unless --steps sets them: name -> (value, source)."""
+        """Return run settings for any value of the axis, unless --steps sets them: name -> (value, source)."""
         return {}
 
     def pretrained(self, variant: Variant) -> Variant | None:
-        """Return the variant from whose final policy a cell starts, or None: it starts from scratch."""
+        """Return the variant whose final policy a cell starts from; None: from scratch."""
         return None
 
 
 class Cutout(Axis):
-    """Holds the inner part of the training region out (paper, section 5.2)."""
+    """Holds out the inner part of the training region (paper, section 5.2)."""
 
     name = "cutout"
     metavar = "F"
     help = "hold out the inner fraction F of the goal region from training"
 
     def check(self, value: Value, task: Task) -> None:
-        """Refuse fractions outside (0, 1) and tasks without positions."""
+        """Check that the fraction is in (0, 1) and that the task has positions."""
         if not 0.0 < float(value) < 1.0:
             raise UserError(f"--cutout must be between 0 and 1 (both excluded), not {value:g}")
         task.in_cutout(task.evaluation_instances()[:1], float(value))
 
     def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
-        """Leave the cutout region out of training."""
+        """Hold out the cutout region from training."""
         return replace(problem, cutout=float(value))
 
 
@@ -82,7 +82,7 @@ class Alpha(Axis):
     help = "add the trade-off reward with coefficient A"
 
     def check(self, value: Value, task: Task) -> None:
-        """Refuse coefficients outside [0, 1]."""
+        """Check that the coefficient is in [0, 1]."""
         if not 0.0 <= float(value) <= 1.0:
             raise UserError(f"--alpha must be between 0 and 1, not {value:g}")
 
@@ -92,24 +92,24 @@ class Alpha(Axis):
 
 
 class _OneInstance(Axis):
-    """Trains on one of the task's fine-tuning instances alone."""
+    """Trains only on one of the task's fine-tuning instances."""
 
     kind = int
     metavar = "N"
     exclusive = "instance"
 
     def check(self, value: Value, task: Task) -> None:
-        """Refuse numbers of instances that the task does not have."""
+        """Check that the task has an instance with this number."""
         count = len(task.fine_tuning_instances())
         if not 1 <= int(value) <= count:
             raise UserError(f"--{self.name} {value}: task '{task.name}' has fine-tuning instances 1 to {count}")
 
     def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
-        """Train and evaluate on the one instance."""
+        """Train and evaluate on this instance."""
         return replace(problem, instances=problem.task.fine_tuning_instances()[int(value) - 1 : int(value)])
 
     def run_overrides(self, run: RunSettings) -> Mapping[str, tuple[Any, str]]:
-        """Return the smaller budget of one instance."""
+        """Return the smaller budget for one instance."""
         return {"steps": (run.fine_tuning_steps, "fine_tuning_steps")}
 
 
@@ -125,7 +125,7 @@ class Finetune(_OneInstance):
 
 
 class Scratch(_OneInstance):
-    """Trains from scratch on one instance, which fine-tuning is compared with (paper, section 5.2)."""
+    """Trains from scratch on one instance, as a comparison for fine-tuning (paper, section 5.2)."""
 
     name = "scratch"
     help = "train from scratch on fine-tuning instance N"
@@ -135,12 +135,12 @@ BUILT_IN: Mapping[str, Axis] = {axis.name: axis for axis in (Cutout(), Alpha(), 
 
 
 def axis_named(name: str) -> Axis:
-    """Return the axis `name`: a built-in one, or one of a known study.
+    """Return the axis `name`, built-in or of a study.
 
     Raises:
-        UserError: there is no such axis.
+        UserError: an unknown axis.
     """
-    if name in BUILT_IN:  # without importing any study
+    if name in BUILT_IN:  # without importing a study
         return BUILT_IN[name]
     known = axes()
     if name not in known:
@@ -149,16 +149,16 @@ def axis_named(name: str) -> Axis:
 
 
 def axes() -> dict[str, Axis]:
-    """Return all axes by name: the built-in ones, then those of every known study."""
+    """Return all axes by name: the built-in ones, then those of every study."""
     added = (axis for study in names("studies") for axis in load_attribute("studies", study, "STUDY").axes)
     return {**BUILT_IN, **{axis.name: axis for axis in added}}
 
 
 def parse_axis_value(name: str, text: str) -> Value:
-    """Return a value of the axis `name` from text.
+    """Parse a value of the axis `name`.
 
     Raises:
-        UserError: there is no such axis, or the value has another type.
+        UserError: an unknown axis, or a value of the wrong type.
     """
     axis = axis_named(name)
     try:

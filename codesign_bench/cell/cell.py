@@ -1,4 +1,4 @@
-"""A cell: one method, on one task, in one variant, with one seed. Plain values only, so that it travels as JSON."""
+"""A cell: one method on one task in one variant with one seed, as plain values that can be sent as JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from codesign_bench.task import Task, load_task
 
 @dataclass(frozen=True)
 class Cell:
-    """What one run is: where its results lie follows from task, method, variant and seed."""
+    """One method on one task; task, method, variant and seed determine the folder of its results."""
 
     task: str
     method: str
@@ -41,7 +41,7 @@ class Cell:
 
     @property
     def pretrained(self) -> Cell | None:
-        """The cell from whose final policy it starts, or None."""
+        """The cell whose final policy it starts from, or None."""
         for axis, _ in self.variant:
             before = axis_named(axis).pretrained(self.variant)
             if before is not None:
@@ -49,7 +49,7 @@ class Cell:
         return None
 
     def to_json(self) -> str:
-        """Return it as a line of JSON."""
+        """Return the cell as a line of JSON."""
         return json.dumps({**asdict(self), "variant": self.variant.to_json()})
 
     @classmethod
@@ -62,7 +62,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class ResolvedCell:
-    """A cell with everything that its names mean; made once in a process, by `resolve_cell`."""
+    """A cell with its task, method and configuration; made by `resolve_cell`, once per process."""
 
     cell: Cell
     task: Task
@@ -70,7 +70,7 @@ class ResolvedCell:
     config: ResolvedConfig
 
     def problem(self) -> Problem:
-        """Return what its method is asked to learn."""
+        """Return the learning problem of its method."""
         problem = Problem(self.task)
         for axis, value in self.cell.variant:
             problem = axis_named(axis).problem(problem, value, self.config.run)
@@ -81,7 +81,7 @@ def resolve_cell(cell: Cell) -> ResolvedCell:
     """Return the cell with its task, method and configuration.
 
     Raises:
-        UserError: an unknown name, or a value that cannot be.
+        UserError: an unknown name, or an invalid value.
     """
     method_class = load_method(cell.method)
     varied = [text for axis, value in cell.variant for text in axis_named(axis).overrides(value)]
@@ -95,10 +95,10 @@ def resolve_cell(cell: Cell) -> ResolvedCell:
 
 
 def resolve_cells(cells: Sequence[Cell]) -> list[ResolvedCell]:
-    """Resolve every cell; refuse overrides that no method knows, and variants that a task cannot have.
+    """Resolve every cell; check that methods have the overridden settings and that tasks can have the variants.
 
     Raises:
-        UserError: naming the first.
+        UserError: a check fails; names the first.
     """
     methods = [load_method(name) for name in dict.fromkeys(cell.method for cell in cells)]
     for overrides in dict.fromkeys(cell.overrides for cell in cells):

@@ -22,13 +22,13 @@ def grid(
     steps: int | None = None,
     overrides: Sequence[str] = (),
 ) -> Iterator[Cell]:
-    """Yield every cell; seeds come before methods, so that a sweep cut short has every method."""
+    """Yield every cell; all methods of a seed come before the next seed, so that a partial sweep has every method."""
     for task, seed, variant, method in product(tasks, seeds, variants, methods):
         yield Cell(task, method, seed, variant, profile, steps, tuple(overrides))
 
 
 def variants_of(values: Mapping[str, Sequence[Value]]) -> list[Variant]:
-    """Return every combination of values on axes; axes that exclude each other come one after the other.
+    """Return every combination of values on axes; axes that exclude each other are varied separately.
 
     Args:
         values: axis -> its values; an axis without values is not varied.
@@ -43,10 +43,10 @@ def variants_of(values: Mapping[str, Sequence[Value]]) -> list[Variant]:
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:
-    """Return the seeds that `--seeds` means: `6` is 0 to 5, `0,3,5` a list, `2-4` a range.
+    """Parse `--seeds`: `6` is 0 to 5, `0,3,5` a list, `2-4` a range.
 
     Raises:
-        UserError: it is none of them, or empty, or negative.
+        UserError: it has none of these forms, or is empty or negative.
     """
     try:
         if text.strip().isdigit():

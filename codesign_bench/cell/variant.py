@@ -1,4 +1,4 @@
-"""What a cell varies: values on named axes, from which the name of its folder is derived, here and nowhere else."""
+"""Variants of cells: values on named axes. Only this module derives a folder's name from a variant."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 DEFAULT_NAME = "default"
-"""Name of the variant that varies nothing."""
+"""Name of the default variant, without varied axes."""
 FIRST_AXES = ("cutout", "alpha", "finetune", "scratch")
 """Axes that come first in names and tables, in this order; others follow by name."""
 
@@ -16,7 +16,7 @@ Value: TypeAlias = float | int | str
 
 @dataclass(frozen=True)
 class Variant:
-    """Values on axes, e.g. `Variant.of(cutout=0.4)`; `Variant()` varies nothing."""
+    """Values on axes, e.g. `Variant.of(cutout=0.4)`; `Variant()` is the default variant."""
 
     values: tuple[tuple[str, Value], ...] = ()
     """Axis and value, in the order of axes; made by `of`."""
@@ -37,7 +37,7 @@ class Variant:
         return dict(self.values).get(axis)
 
     def without(self, axis: str) -> Variant:
-        """Return the same variant but for this axis, which is not varied."""
+        """Return the same variant without this axis."""
         return Variant(tuple((name, value) for name, value in self.values if name != axis))
 
     def with_(self, **values: Value | None) -> Variant:
@@ -45,7 +45,7 @@ class Variant:
         return Variant.of(**{**self.to_json(), **values})
 
     def __iter__(self) -> Iterator[tuple[str, Value]]:
-        """Yield axis and value of everything that is varied."""
+        """Yield each varied axis and its value."""
         return iter(self.values)
 
     def to_json(self) -> dict[str, Value]:
@@ -54,7 +54,7 @@ class Variant:
 
     @classmethod
     def from_json(cls, values: Mapping[str, Value | None]) -> Variant:
-        """Return the variant that `to_json` told.
+        """Return the variant that `to_json` wrote.
 
         Raises:
             TypeError: a value is neither a number nor text.
@@ -66,16 +66,16 @@ class Variant:
 
 
 DEFAULT = Variant()
-"""The variant that varies nothing."""
+"""The default variant, without varied axes."""
 
 
 def in_axis_order(axes: Mapping[str, object] | set[str]) -> list[str]:
-    """Return the names of axes in the order in which names and tables have them."""
+    """Return the names of axes in the order of variants' names and tables."""
     return [axis for axis in FIRST_AXES if axis in axes] + sorted(set(axes) - set(FIRST_AXES))
 
 
 def _text(value: Value) -> str:
-    """Return a value as text: two decimals for a float if they tell it exactly, all of its digits if not."""
+    """Return a value as text; floats have two decimals if these are exact, otherwise all digits."""
     if isinstance(value, float):
         return f"{value:.2f}" if round(value, 2) == value else repr(value)
     return str(value)

@@ -1,5 +1,5 @@
-"""Which findings of a study do results support? A study lists its claims; see docs/claims.md.
+"""Claims of a study and the rules that judge them on results; see docs/claims.md.
 
-`claim.py` says what a claim and its rule are, `finding.py` what a rule finds, `evidence.py` what claims are judged on,
-`verify.py` judges them and writes the table. Each other module holds rules of one kind.
+`claim.py` defines claim and rule, `finding.py` a rule's finding, `evidence.py` the data, `statistics.py` what several
+rules share. The other modules have the kinds of rules, and `verify.py` judges claims and writes the table.
 """

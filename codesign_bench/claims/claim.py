@@ -1,4 +1,4 @@
-"""What a claim is, and the rule that judges it."""
+"""A claim, and the rule that judges it."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from codesign_bench.console import Log
 
 @dataclass(frozen=True)
 class Rule:
-    """How a claim is judged, written down before any result is looked at."""
+    """How a claim is judged; written down before any result is seen."""
 
     kind: str
-    """Name of the rule, under which docs/claims.md explains it."""
+    """Name of the rule in docs/claims.md, which explains it."""
     statistic: str
-    """The number that is computed, in a few words."""
+    """The statistic, in a few words."""
     words: str
-    """When it supports and when it contradicts the claim."""
+    """When the statistic supports the claim and when it contradicts it."""
     needs: tuple[str, ...]
-    """Commands that make the data; `{results}` stands for the results folder, `{profile}` for its option or nothing."""
+    """Commands that produce the data; `{results}` is the results folder, `{profile}` its option or nothing."""
     judge: Callable[[Evidence, np.random.Generator], Finding]
-    """The rule itself; raises `InsufficientData` where data are missing."""
+    """The rule itself; raises `InsufficientData` if data are missing."""
     measure: Callable[[Path, Log], object] | None = None
-    """Makes what no cell holds by playing finished policies or scripts, if it is missing; it may take minutes."""
+    """Measures missing data that are not in cells by playing finished policies or scripts; may take minutes."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +36,11 @@ class Claim:
     """One finding of a study, with the rule that judges it."""
 
     name: str
-    """Unique, for tables and files."""
+    """Unique name for tables and files."""
     sentence: str
-    """What is claimed, in our words."""
+    """The claim, in our words."""
     source: str
     """Section, figure or table of a publication, or "ours"."""
     rule: Rule
     tasks: tuple[str, ...] = ()
-    """Tasks that it speaks of; where results hold nothing of one of them, the claim is not asked."""
+    """Tasks of the claim; without results of all of them, the claim is not asked."""

@@ -1,4 +1,4 @@
-"""Rules that compare methods: how high they end, and how soon.
+"""Rules that compare methods by final return and by sample efficiency.
 
 Shapes: `N` seeds, `R` resamples, `T` evaluations along a curve.
 """
@@ -69,12 +69,15 @@ def fewer_steps(task: str, method: str, baseline: str, seeds: int) -> Rule:
 
 
 def steps_to_reach(steps: np.ndarray, curves: np.ndarray, targets: np.ndarray) -> np.ndarray:
-    """Return (R,): the environment steps (T,) at which curves (R, T) first reach targets (R,), infinity where never.
+    """Return (R,): the environment steps (T,) at which curves (R, T) first reach targets (R,); infinity if never.
 
-    Between two evaluations the curve is a straight line.
+    Curves are interpolated linearly between evaluations.
     """
     reached = curves >= targets[:, None]
     first = reached.argmax(axis=1)
+    # `first` is the evaluation that reached the target; the crossing is between it and the one before. A curve that
+    # starts at the target crosses at its first step. argmax is also 0 for a curve that never reaches it, hence the last
+    # line.
     row, before = np.arange(len(curves)), np.maximum(first - 1, 0)
     rise = curves[row, first] - curves[row, before]
     missing = targets - curves[row, before]

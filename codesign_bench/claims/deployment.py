@@ -14,11 +14,11 @@ from codesign_bench.deployment.tables import GRID, OWN
 def own_instance_solved(task: str, method: str, *, tools: int, trials: int) -> Rule:
     """Return the rule for "deployed policies succeed on the instance of `task` that their tool was designed for".
 
-    Nothing is judged with fewer than `tools` tools and `trials` trials of each.
+    At least `tools` tools and `trials` trials of each are needed.
     """
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
-        del rng  # trials are few and of one policy: no interval would say what other policies do
+        del rng  # few trials of one policy: an interval would say nothing about other policies
         rows = _trials(evidence, task, OWN, tools)
         rates = rows.groupby("tool")["success"].mean()
         made = int(rows.groupby("tool").size().min())
@@ -41,16 +41,17 @@ def own_instance_solved(task: str, method: str, *, tools: int, trials: int) -> R
 def no_tool_solves_the_grid(task: str, method: str, *, tools: int, starts: int) -> Rule:
     """Return the rule for "no tool solves the whole grid of starts of `task`".
 
-    Nothing is judged with fewer than `tools` tools and `starts` starts of the grid.
+    At least `tools` tools and `starts` starts of the grid are needed.
     """
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
-        del rng  # one start that a tool fails is enough
+        del rng  # one failed start per tool is enough: nothing is estimated from a sample
         rows = _trials(evidence, task, GRID, tools)
         tried = int(rows.groupby("tool").size().min())
         if tried < starts:
             raise InsufficientData(f"{tried} starts of the grid of {task} were tried with a tool; {starts} are needed")
         solved = rows.pivot_table(index="tool", columns=["row", "column"], values="success") > 0
+        # A start that no tool solves says nothing about one tool against several.
         solvable = solved.loc[:, solved.any()]
         if solvable.shape[1] == 0:
             raise InsufficientData(f"no tool solves any start of the grid of {task}")

@@ -1,4 +1,4 @@
-"""What claims are judged on: the results folder as frames, from finished cells alone.
+"""The data for judging claims: a results folder as frames, only from finished cells.
 
 Shapes: `N` seeds, `G` evaluation instances.
 """
@@ -29,26 +29,26 @@ DESIGN_PREFIX = "design_"
 
 @dataclass(frozen=True)
 class Evidence:
-    """Frames that may be empty; every method that finds no data says so by `InsufficientData`."""
+    """Frames that may be empty; methods raise `InsufficientData` if data are missing."""
 
     curves: pd.DataFrame = field(default_factory=pd.DataFrame)
-    """As `codesign_bench.load_results` gives them."""
+    """Rows of `codesign_bench.load_results`."""
     evaluations: pd.DataFrame = field(default_factory=pd.DataFrame)
-    """As `codesign_bench.storage.frames.load_evaluations` gives them."""
+    """Rows of `codesign_bench.storage.frames.load_evaluations`."""
     sensitivity: pd.DataFrame = field(default_factory=pd.DataFrame)
-    """As `codesign_bench.evaluation.sensitivity.measure` gives it, several tasks below each other."""
+    """Rows of `codesign_bench.evaluation.sensitivity.measure` for several tasks."""
     outside: pd.DataFrame = field(default_factory=pd.DataFrame)
-    """As `codesign_bench.evaluation.extrapolation.load_or_measure` gives it."""
+    """Rows of `codesign_bench.evaluation.extrapolation.load_or_measure`."""
     deployment: pd.DataFrame = field(default_factory=pd.DataFrame)
-    """As `codesign_bench.deployment.tables.load_deployment` gives it."""
+    """Rows of `codesign_bench.deployment.tables.load_deployment`."""
     design_widths: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Task -> column of a design parameter in `evaluations` -> width of its range, in the parameter's unit."""
     profile: str = DEFAULT_PROFILE
-    """The profile that the cells were run with, if it is the same for all, so that what is missing can match them."""
+    """The profile of the cells, if it is the same for all, so that commands for missing data match them."""
 
     @property
     def tasks(self) -> set[str]:
-        """Names of the tasks of which anything is known."""
+        """Names of the tasks with any data."""
         frames = (self.curves, self.evaluations, self.sensitivity, self.outside, self.deployment)
         return {str(task) for frame in frames if len(frame) for task in frame["task"].unique()}
 
@@ -105,10 +105,10 @@ def _select(frame: pd.DataFrame, task: str, method: str, variant: Variant) -> pd
 
 
 def load_evidence(results: Path) -> Evidence:
-    """Read everything that claims are judged on from a results folder.
+    """Read the data for judging claims from a results folder.
 
     Raises:
-        UserError: there is no such folder, or it holds neither a finished cell nor a design-sensitivity table.
+        UserError: the folder does not exist, or has neither a finished cell nor a design-sensitivity table.
     """
     profiles = {cell.record.profile for cell in find_cells(results)}
     curves = _read(load_results, results, ("return_mean", "success_rate"))
@@ -123,10 +123,10 @@ def load_evidence(results: Path) -> Evidence:
 
 
 def _read(read: Callable[[Path], pd.DataFrame], results: Path, needed: Sequence[str]) -> pd.DataFrame:
-    """Return a frame, empty where there is none: the claims that need it will say so.
+    """Return a frame, empty if there is none; the claims that need it report this.
 
     Raises:
-        UserError: the frame lacks a value in a column of `needed`.
+        UserError: a value is missing in a column of `needed`.
     """
     try:
         frame = read(results)
@@ -136,7 +136,7 @@ def _read(read: Callable[[Path], pd.DataFrame], results: Path, needed: Sequence[
         raise UserError(f"cannot read a table in '{results}': {' '.join(str(error).split())}") from error
     for column in needed:
         if column not in frame.columns or frame[column].isna().any():
-            raise UserError(f"a table in '{results}' is damaged or none of ours: it lacks values of '{column}'")
+            raise UserError(f"a table in '{results}' is damaged or not ours: values of '{column}' are missing")
     return frame
 
 

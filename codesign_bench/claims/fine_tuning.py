@@ -1,4 +1,4 @@
-"""Rules about going on from a trained policy with one instance.
+"""Rules about fine-tuning a trained policy on one instance.
 
 Shapes: `N` seeds.
 """
@@ -16,11 +16,11 @@ from codesign_bench.claims.finding import Finding, above, below
 from codesign_bench.claims.statistics import OVER_SEEDS, check_budgets, difference, estimate, mean, seeds_of
 
 SOLVED = 0.5
-"""Share of seeds above which an instance is solved (ours)."""
+"""An instance counts as solved above this fraction of seeds (ours)."""
 
 
 def fine_tuning_wins(task: str, method: str, number: int, needs: tuple[str, ...]) -> Rule:
-    """Return the rule for "going on with fine-tuning instance `number` beats learning it from scratch"."""
+    """Return the rule for "fine-tuning on instance `number` beats training from scratch"."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         variants = (Variant.of(finetune=number), Variant.of(scratch=number))
@@ -39,7 +39,7 @@ def fine_tuning_wins(task: str, method: str, number: int, needs: tuple[str, ...]
 
 
 def mean_along_curve(rows: pd.DataFrame) -> np.ndarray:
-    """Return (N,): each seed's return averaged along its curve, which is straight between evaluations."""
+    """Return (N,): each seed's return averaged along its linearly interpolated curve."""
     means = []
     for _, curve in rows.sort_values("env_steps").groupby("seed"):
         steps, returns = curve["env_steps"].to_numpy(dtype=np.float64), curve["return_mean"].to_numpy(dtype=np.float64)
@@ -48,7 +48,7 @@ def mean_along_curve(rows: pd.DataFrame) -> np.ndarray:
 
 
 def unsolved_before(task: str, method: str, number: int, needs: tuple[str, ...]) -> Rule:
-    """Return the rule for "the policy that is fine-tuned does not solve fine-tuning instance `number` beforehand"."""
+    """Return the rule for "before fine-tuning, the policy does not solve fine-tuning instance `number`"."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         curves = evidence.curve(task, method, Variant.of(finetune=number)).sort_values("env_steps")

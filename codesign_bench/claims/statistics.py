@@ -1,4 +1,4 @@
-"""What several kinds of rules share.
+"""Shared by several kinds of rules.
 
 Shapes: `N` seeds, `R` resamples, `F` fractions or coefficients.
 """
@@ -17,18 +17,18 @@ from codesign_bench.claims.finding import InsufficientData
 
 OVER_SEEDS = "the 95 % bootstrap interval over seeds"
 BUDGET_TOLERANCE = 0.1
-"""Relative difference in environment steps up to which two methods had the same budget; batches overshoot a little."""
+"""Budgets count as equal up to this relative difference in environment steps, since batches overshoot slightly."""
 FEWEST_LEVELS = 3
-"""Fractions or coefficients below which no trend is looked for."""
+"""Fewest fractions or coefficients for a trend."""
 
 Statistic = Callable[..., np.ndarray]
 """Takes resampled samples (R, N, ...) and returns (R,)."""
 
 
 def run_command(method: str, task: str, seeds: int, more: str = "") -> str:
-    """Return the command that makes cells, with the places that `Rule.needs` tells.
+    """Return the command that runs cells, with the placeholders of `Rule.needs`.
 
-    Cells that are done are skipped, so claims about one task may share a command, `method` being "all".
+    Finished cells are skipped, so claims about one task may share a command with `method` "all".
     """
     return f"codesign-bench run --method {method} --task {task}{more} --seeds {seeds}{{profile}} --out {{results}}"
 
@@ -36,28 +36,30 @@ def run_command(method: str, task: str, seeds: int, more: str = "") -> str:
 def estimate(
     samples: Sequence[np.ndarray], statistic: Statistic, rng: np.random.Generator
 ) -> tuple[float, float, float]:
-    """Return a statistic of samples (N, ...), and the ends of its bootstrap interval over seeds."""
+    """Return a statistic of samples (N, ...) and the ends of its bootstrap interval over seeds."""
     low, high = stats.bootstrap(samples, statistic, rng)
     return float(statistic(*(sample[None] for sample in samples))[0]), float(low), float(high)
 
 
 def mean(sample: np.ndarray) -> np.ndarray:
-    """Return (R,) means of (R, N)."""
+    """Return the means (R,) of samples (R, N)."""
     return np.asarray(sample.mean(axis=1))
 
 
 def difference(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return (R,) differences of the means of two samples (R, N)."""
+    """Return the differences (R,) of the means of two samples (R, N)."""
     return mean(first) - mean(second)
 
 
 def trend(levels: Sequence[float]) -> Statistic:
-    """Return Spearman's rank correlation of F levels with the means of as many samples, as a function of the samples.
+    """Return Spearman's rank correlation of F levels with the means of F samples, as a function of the samples.
 
-    Where all means are equal it is 0.
+    It is 0 if all means are equal.
     """
 
     def correlation(*samples: np.ndarray) -> np.ndarray:
+        # Pearson's correlation of ranks, for all resamples at once. Ranks instead of values, since a claim about a
+        # trend is about its direction, and one extreme seed must not decide it.
         ranks = rankdata([mean(sample) for sample in samples], axis=0)  # (F, R)
         ranks = ranks - ranks.mean(axis=0)
         order = rankdata(levels) - rankdata(levels).mean()
@@ -68,7 +70,7 @@ def trend(levels: Sequence[float]) -> Statistic:
 
 
 def at_each(levels: Sequence[float], read: Callable[[float], np.ndarray]) -> dict[float, np.ndarray]:
-    """Return what `read` finds at each level in rising order, leaving out levels without data.
+    """Return `read(level)` for each level in ascending order, without levels that have no data.
 
     Raises:
         InsufficientData: fewer than `FEWEST_LEVELS` levels have data.
@@ -88,7 +90,7 @@ def check_budgets(evidence: Evidence, task: str, *sides: tuple[str, Variant]) ->
     """Check that all sides, each (method, variant), were trained for the same number of environment steps.
 
     Raises:
-        InsufficientData: they were not, or a side lacks cells.
+        InsufficientData: they were not, or cells of a side are missing.
     """
     budgets = [evidence.budget(task, method, variant) for method, variant in sides]
     if max(budgets) > (1.0 + BUDGET_TOLERANCE) * min(budgets):
@@ -111,7 +113,7 @@ def seeds_of(*samples: np.ndarray) -> str:
 
 
 def seeds_at_each(found: dict[float, np.ndarray]) -> str:
-    """Return the levels found and the numbers of their seeds as text."""
+    """Return the levels and their numbers of seeds as text."""
     counts = sorted({len(sample) for sample in found.values()})
     seeds = "-".join(str(count) for count in dict.fromkeys((counts[0], counts[-1])))
     return f"{seeds} seeds at each of {', '.join(f'{level:g}' for level in found)}"

@@ -17,18 +17,18 @@ from codesign_bench.claims.statistics import OVER_SEEDS, estimate, mean, run_com
 from codesign_bench.evaluation.sensitivity import measure_missing
 
 GOAL_SHARE = 0.1
-"""Share of the variance of tools that goals must make for tools to vary with the goal (ours)."""
+"""Tools vary with the goal if goals explain more than this fraction of their variance (ours)."""
 FEWEST_TOOLS = 50
-"""Tools that must have been tried before their failing says something of tools at large (ours)."""
+"""Fewest tried tools for a statement about tools in general (ours)."""
 
 
 def tools_vary(task: str, method: str, seeds: int) -> Rule:
-    """Return the rule for "`method` makes other tools for other goals of `task`"."""
+    """Return the rule for "`method` designs different tools for different goals of `task`"."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         rows = evidence.instances(task, method)
         if task not in evidence.design_widths:
-            raise InsufficientData(f"the task '{task}' is not known here")
+            raise InsufficientData(f"the task '{task}' is unknown")
         shares = goal_shares(rows, evidence.design_widths[task])
         value, low, high = estimate([shares], mean, rng)
         return Finding(above(low, high, GOAL_SHARE), value, low, high, seeds_of(shares))
@@ -45,15 +45,18 @@ def tools_vary(task: str, method: str, seeds: int) -> Rule:
 def goal_shares(rows: pd.DataFrame, widths: Mapping[str, float]) -> np.ndarray:
     """Return (N,): each seed's variance of designs over goals, divided by the variance over all goals and seeds.
 
-    Variances are summed over design parameters, each measured in widths of its range; without any variance it is 0.
+    Variances are summed over design parameters, each in units of the width of its range; 0 if there is no variance.
 
     Args:
         rows: one row per seed and goal, with the columns named in `widths`.
         widths: column of a design parameter -> width of its range.
     """
     columns = [column for column, width in widths.items() if width > 0.0]
+    # Lengths and angles have different units; in widths of their ranges they can be added.
     units = rows[columns] / [widths[column] for column in columns]
     total = float(units.var(ddof=0).sum())
+    # Seeds that agree on one tool for all goals have no variance within seeds; seeds that find different but constant
+    # tools have only variance between them, which the total contains and this does not.
     within = units.groupby(rows["seed"]).var(ddof=0).sum(axis=1).to_numpy()
     return within / total if total > 0.0 else np.zeros_like(within)
 
@@ -68,6 +71,7 @@ def no_single_tool(task: str) -> Rule:
         if rows.empty:
             raise InsufficientData(f"the design sensitivity of {task} is not measured")
         solved = rows.pivot(index="tool", columns="goal", values="success") > 0
+        # A goal that no tool solves says nothing about one tool against several.
         solvable = solved.loc[:, solved.any()]
         if len(solved) < FEWEST_TOOLS or solvable.shape[1] < 2:
             raise InsufficientData(

@@ -21,7 +21,7 @@ QUANTITIES = {
     EFFORT: "mean effort c_used/c_max",
     RATIO: "ratio of mean material to mean effort",
 }
-"""What may follow alpha, each a mean over evaluation instances of one seed."""
+"""Quantities that may depend on alpha, each a mean over evaluation instances of one seed."""
 
 
 def rises_with_alpha(task: str, method: str, alphas: Sequence[float], quantity: str, needs: str) -> Rule:
@@ -71,7 +71,7 @@ def ratio_in_order(task: str, method: str, alphas: Sequence[float], needs: str) 
 
 
 def smallest_drop(*samples: np.ndarray) -> np.ndarray:
-    """Return (R,): the smallest fall of the mean from one sample (R, N) to the next; negative if it rises somewhere."""
+    """Return (R,): the smallest decrease of the mean from one sample (R, N) to the next; negative if one increases."""
     return np.asarray((-np.diff([mean(sample) for sample in samples], axis=0)).min(axis=0))
 
 
@@ -82,5 +82,6 @@ def _quantity(evidence: Evidence, task: str, method: str, alpha: float, quantity
     if quantity != RATIO:
         return means[quantity].to_numpy()
     if (means[EFFORT] <= 0.0).any():
-        raise InsufficientData(f"a seed of {task}/{method}/{variant.name} never moves: its ratio is infinite")
+        raise InsufficientData(f"a seed of {task}/{method}/{variant.name} never moves, so the ratio is infinite")
+    # The ratio of means, not the mean of ratios: single episodes with hardly any effort would dominate the latter.
     return (means[MATERIAL] / means[EFFORT]).to_numpy()

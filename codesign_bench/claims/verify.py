@@ -1,4 +1,4 @@
-"""Judge claims on results, and write the table: printed, as Markdown and as JSON."""
+"""Judge claims on results; print the table and write it as Markdown and JSON."""
 
 from __future__ import annotations
 
@@ -24,37 +24,37 @@ from codesign_bench.text_tables import markdown
 
 MARKDOWN_FILE, JSON_FILE = "claims.md", "claims.json"
 SEED = 0
-"""Of the bootstrap; each claim has a stream of its own, so that a new claim never moves another's interval."""
+"""Seed of the bootstrap. Each claim has a separate random stream, so a new claim does not change other intervals."""
 
 
 class Claimant(Protocol):
-    """What makes claims: a study."""
+    """A source of claims, i.e. a study."""
 
     @property
     def name(self) -> str:
-        """Its short name."""
+        """Short name."""
 
     @property
     def title(self) -> str:
-        """Its name in headings."""
+        """Name in headings."""
 
     @property
     def claims(self) -> Callable[[], Sequence[Claim]]:
-        """Makes its claims."""
+        """Returns the claims."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A claim beside what was found."""
+    """A claim and its finding."""
 
     claim: Claim
     finding: Finding
     needs: tuple[str, ...] = ()
-    """Commands that make the missing data; empty where none are missing."""
+    """Commands that produce missing data; empty if none are missing."""
 
     @property
     def asked(self) -> bool:
-        """Whether the results hold something of every task that the claim speaks of."""
+        """Whether there are results of every task of the claim."""
         return self.finding.verdict != NOT_ASKED
 
     @property
@@ -69,7 +69,7 @@ class Row:
 
 
 def judge(claims: Sequence[Claim], evidence: Evidence, results: str) -> list[Row]:
-    """Judge each claim; `results` is the folder that commands for missing data name."""
+    """Judge each claim; `results` is the folder in commands for missing data."""
     return [_row(claim, evidence, results) for claim in claims]
 
 
@@ -88,10 +88,10 @@ def _row(claim: Claim, evidence: Evidence, results: str) -> Row:
 def verify(study: Claimant, results: Path, out: Path, console: Console, *, measure: bool = False) -> None:
     """Judge the claims of a study on the results folder, print the table and write it into `out`.
 
-    With `measure`, tools and policies are first played where claims need outcomes that no cell holds; it takes minutes.
+    With `measure`, outcomes that claims need but cells do not have are measured first, which takes minutes.
 
     Raises:
-        UserError: there are no results, they cannot be read, or `out` cannot be written.
+        UserError: there are no results, they cannot be read, or `out` is not writable.
     """
     claims, log = study.claims(), printer(console)
     evidence = load_evidence(results)
@@ -106,7 +106,7 @@ def verify(study: Claimant, results: Path, out: Path, console: Console, *, measu
 
 
 def _measure(claims: Sequence[Claim], evidence: Evidence, results: Path, log: Log) -> None:
-    """Make what no cell holds for every claim that is asked; say what cannot be made."""
+    """Measure what cells do not have, for every claim that is asked; log what cannot be measured."""
     for claim in claims:
         if claim.rule.measure is not None and set(claim.tasks) <= evidence.tasks:
             try:
@@ -116,7 +116,7 @@ def _measure(claims: Sequence[Claim], evidence: Evidence, results: Path, log: Lo
 
 
 def print_rows(rows: Sequence[Row], console: Console) -> None:
-    """Print one line per claim that is asked, those without data last, then counts and what would make missing data."""
+    """Print one line per claim that is asked, those without data last, then counts and commands for missing data."""
     log = printer(console)
     ordered = sorted((row for row in rows if row.asked), key=lambda row: bool(row.needs))
     table = [(row.finding.verdict, row.claim.name, row.interval, row.finding.n, row.finding.note) for row in ordered]
@@ -126,7 +126,7 @@ def print_rows(rows: Sequence[Row], console: Console) -> None:
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """Return the counts of verdicts as a line."""
+    """Return the counts of verdicts as one line."""
     asked = [row for row in rows if row.asked]
     counts = Counter(row.finding.verdict for row in asked)
     lacking = sum(bool(row.needs) for row in asked)
@@ -137,15 +137,15 @@ def summary(rows: Sequence[Row]) -> str:
 
 
 def missing(rows: Sequence[Row]) -> list[str]:
-    """Return the commands that make all missing data of the claims that are asked, each once."""
+    """Return the commands that produce all missing data of the claims that are asked, without duplicates."""
     return list(dict.fromkeys(command for row in rows if row.asked for command in row.needs))
 
 
 def write_rows(rows: Sequence[Row], study: Claimant, results: Path, out: Path) -> list[Path]:
-    """Write the rows as Markdown and JSON into `out` and return the paths.
+    """Write the rows as Markdown and JSON to `out` and return the paths.
 
     Raises:
-        UserError: `out` cannot be written.
+        UserError: `out` is not writable.
     """
     paths = [out / JSON_FILE, out / MARKDOWN_FILE]
     try:
@@ -158,7 +158,7 @@ def write_rows(rows: Sequence[Row], study: Claimant, results: Path, out: Path) -
 
 
 def as_json(rows: Sequence[Row], study: Claimant, results: Path) -> dict[str, Any]:
-    """Return everything that is known of each claim, as JSON values; what is not finite is None or text."""
+    """Return all data of each claim as JSON values; non-finite numbers are None or text."""
     return {
         "version": __version__,
         "study": study.name,
@@ -187,7 +187,7 @@ def as_json(rows: Sequence[Row], study: Claimant, results: Path) -> dict[str, An
 
 
 def as_markdown(rows: Sequence[Row], study: Claimant, results: Path) -> str:
-    """Return the page: the table of claims, the rules that judged them, and the commands for missing data."""
+    """Return the page: the table of claims, their rules, and the commands for missing data."""
     asked = [row for row in rows if row.asked]
     header = ("claim", "verdict", "statistic [95 % interval]", "n", "rule", "source", "note")
     table = [
@@ -221,7 +221,7 @@ def as_markdown(rows: Sequence[Row], study: Claimant, results: Path) -> str:
 
 
 def by_rule(rows: Sequence[Row]) -> str:
-    """Return a Markdown table of how many claims came out how, by the rule that judged them."""
+    """Return a Markdown table with the number of claims per rule and verdict."""
     kinds = dict.fromkeys(row.claim.rule.kind for row in rows)
     found = Counter((row.claim.rule.kind, row.finding.verdict) for row in rows)
     table = [(kind, *(str(found[kind, verdict]) for verdict in VERDICTS)) for kind in kinds]
@@ -229,7 +229,7 @@ def by_rule(rows: Sequence[Row]) -> str:
 
 
 def contradicted(rows: Sequence[Row]) -> str:
-    """Return a Markdown list of the claims that the results contradict, each with what was found."""
+    """Return a Markdown list of the claims that the results contradict, with their findings."""
     lines = [
         f"- {row.claim.sentence}: {row.interval} ({'; '.join(filter(None, (row.finding.n, row.finding.note)))})"
         for row in rows

@@ -1,4 +1,4 @@
-"""Rules about instances that were never trained on.
+"""Rules about instances that were held out of training.
 
 Shapes: `N` seeds, `R` resamples.
 """
@@ -28,13 +28,13 @@ from codesign_bench.evaluation.extrapolation import RIM, load_or_measure
 from codesign_bench.stats import MIN_SEEDS
 
 CLOSE = 0.9
-"""Share of the seen instances' return that the unseen ones must keep to do as well (ours)."""
+"""Unseen instances do as well as seen ones above this fraction of the seen return (ours)."""
 GENTLE = 0.5
-"""Largest loss of that share, from one cutout fraction to the next, that is a gentle fall (ours)."""
+"""Largest loss of this fraction from one cutout fraction to the next for a gentle fall (ours)."""
 OUTSIDE_SOLVED = 0.5
-"""Success rate above which instances outside the region are solved (ours)."""
+"""Instances outside the region count as solved above this success rate (ours)."""
 SIGNIFICANT = 0.25
-"""Success rate that is a significant portion (ours)."""
+"""Success rate that counts as a significant portion (ours)."""
 
 
 def unseen_close(task: str, method: str, fraction: float, needs: str) -> Rule:
@@ -133,18 +133,19 @@ def outside_solved(task: str, method: str, needs: str) -> Rule:
 
 
 def kept(pairs: np.ndarray) -> np.ndarray:
-    """Return (R,): mean unseen over mean seen return of (R, N, 2), seen and unseen."""
+    """Return (R,): mean unseen return divided by mean seen return, for pairs (R, N, 2) of seen and unseen."""
     means = pairs.mean(axis=1)
+    # A ratio of means over seeds. Both returns of a seed are resampled together, since they are of the same policy.
     return np.asarray(means[:, 1] / means[:, 0])
 
 
 def largest_loss(*samples: np.ndarray) -> np.ndarray:
-    """Return (R,): the largest fall of `kept` from one sample (R, N, 2) to the next; negative if it only rises."""
+    """Return (R,): the largest decrease of `kept` between successive samples (R, N, 2); negative if all increase."""
     return np.asarray((-np.diff([kept(sample) for sample in samples], axis=0)).max(axis=0))
 
 
 def _cutout_rows(evidence: Evidence, task: str, method: str, fraction: float) -> pd.DataFrame:
-    """Return the evaluation of cells trained without a fraction of the region."""
+    """Return the evaluation of cells with a held-out fraction of the region."""
     variant = Variant.of(cutout=fraction)
     rows = evidence.instances(task, method, variant)
     if "in_cutout" not in rows.columns or rows["in_cutout"].isna().any() or rows["in_cutout"].nunique() < 2:
@@ -156,8 +157,9 @@ def _seen_and_unseen(evidence: Evidence, task: str, method: str, fraction: float
     """Return (N, 2): each seed's mean return on the training region and on the cutout region."""
     rows = _cutout_rows(evidence, task, method, fraction)
     means = rows.groupby(["seed", "in_cutout"])["return"].mean().unstack("in_cutout").to_numpy()
+    # A fraction of a return is meaningless if the return is not positive.
     if (means[:, 0] <= 0.0).any():
         raise InsufficientData(
-            f"nothing was learned to compare with: return {means[:, 0].min():.2f} on the training region"
+            f"no learned behaviour to compare with: return {means[:, 0].min():.2f} on the training region"
         )
     return means

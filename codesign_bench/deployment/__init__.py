@@ -1,6 +1,6 @@
-"""Policies on a simulated robot arm: the paper's evaluation on a real robot, as far as a simulator can stand for it.
+"""Policies on a simulated robot arm: a simulated version of the paper's evaluation on a real robot.
 
-`task/robot.py` says what a simulator with an arm offers, `conditions.py` what may differ from training, `rollout.py`
-plays one trial, `protocol.py` says which trials the paper ran, `deploy.py` runs trials and writes them, `pictures.py`
-draws one, `tables.py` reads them back. See docs/deployment.md.
+`task/robot.py` defines a simulator with an arm, `conditions.py` the differences from training, `rollout.py` plays one
+trial, `protocol.py` lists the paper's trials, `deploy.py` runs and writes trials, `pictures.py` draws them, `tables.py`
+reads their tables. See docs/deployment.md.
 """

@@ -1,4 +1,4 @@
-"""How a deployment may differ from training: the arm, what the policy sees and when, and other physics."""
+"""Differences between deployment and training: arm, observation noise, latency and physics."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from codesign_bench.task.robot import ARMS, PANDA
 
 @dataclass(frozen=True)
 class Conditions:
-    """Of a set of trials; by default nothing but the arm differs."""
+    """Conditions of a set of trials; by default only the arm differs from training."""
 
     arm: str = PANDA
     """One of `ARMS`."""
     observation_noise: float = 0.0
-    """Standard deviation of every length that the policy sees, m, drawn anew in every control step."""
+    """Standard deviation of the noise on every observed length, m, redrawn in every control step."""
     latency: int = 0
-    """Control steps by which the state that the policy sees is old."""
+    """Delay of the observed state, control steps."""
     friction: float = 0.0
-    """Each trial multiplies the friction of loose bodies by a number drawn from 1 - this to 1 + this."""
+    """Each trial multiplies the friction of loose bodies by a factor drawn from [1 - this, 1 + this]."""
     mass: float = 0.0
-    """The same of their mass."""
+    """The same for their mass."""
 
     def check(self) -> None:
-        """Refuse values that mean nothing.
+        """Check that all values are valid.
 
         Raises:
-            UserError: one of them is out of its range.
+            UserError: a value is out of range.
         """
         if self.arm not in ARMS:
             raise unknown_name("arm", self.arm, ARMS)
@@ -43,16 +43,16 @@ class Conditions:
 
 
 TRIAL = Conditions(observation_noise=0.002, latency=1, friction=0.2, mass=0.2)
-"""Of the paper's protocol (all ours).
+"""Conditions of the paper's protocol (all ours).
 
-2 mm is what AprilTags seen by cameras half a metre away give; one control step is 42 ms, about an image and its
-processing; a fifth covers what plastics and printed walls differ in.
+2 mm is the accuracy of AprilTags at a distance of half a metre; one control step, 42 ms, is about the time for an image
+and its processing; a fifth covers the differences between plastics and printed walls.
 """
 
 
 @dataclass(frozen=True)
 class Physics:
-    """What one trial multiplies."""
+    """Factors of one trial on friction and mass."""
 
     friction: float
     mass: float

@@ -30,15 +30,15 @@ from codesign_bench.task import Behaviour, Task, deployment_of
 
 @dataclass(frozen=True)
 class Order:
-    """What to run."""
+    """The trials to run."""
 
     conditions: Conditions
     tools: tuple[int, ...] = ()
-    """Numbers of tools, from 1; empty: all."""
+    """Numbers of tools, starting at 1; empty: all."""
     trials: int = 1
-    """Of each tool on its own instance."""
+    """Trials of each tool on its own instance."""
     protocol: bool = False
-    """The paper's: its number of trials, and every tool on the grid."""
+    """Whether to run the paper's protocol: its number of trials, and every tool on the grid."""
     seed: int = 0
     gifs: bool = True
     """Whether to draw every trial."""
@@ -50,15 +50,15 @@ def deploy(
     """Run the trials of `order`, write them below `out` and return one row each.
 
     Args:
-        task: the policy's.
-        policy: makes the tools and controls them.
-        order: what to run.
-        out: a results folder; the files lie in `out`/deployment/<task>.
-        say: tells the user a line.
-        source: where the policy comes from, for the summary.
+        task: the policy's task.
+        policy: designs and controls the tools.
+        order: the trials to run.
+        out: a results folder; files are written to `out`/deployment/<task>.
+        say: prints a line.
+        source: source of the policy, for the summary.
 
     Raises:
-        UserError: the task cannot be deployed, a number of `order` means nothing, or `out` cannot be written.
+        UserError: the task cannot be deployed, a number of `order` is invalid, or `out` is not writable.
     """
     if order.trials < 1:
         raise UserError(f"--trials must be at least 1, not {order.trials}")
@@ -104,7 +104,7 @@ def deploy(
 
 
 def _line(trial: Trial, values: dict[str, Any]) -> str:
-    """Return what the user is told of a trial."""
+    """Return the printed line of a trial."""
     end = "success" if values["success"] else "nearly" if values["near"] else "lost" if values["lost"] else "failure"
     incidents = [f"{name} {values[name]}" for name in values if name.endswith("_steps") and values[name]]
     error = f"tracking error {values['tracking_error_mean_mm']:.1f} mm, at most {values['tracking_error_max_mm']:.1f}"

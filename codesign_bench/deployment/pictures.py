@@ -17,7 +17,7 @@ class Film:
         self._moments: list[Moment] = []
 
     def __call__(self, episodes: Episodes) -> None:
-        """Take a picture, if it is time for one or the trial has ended."""
+        """Take a picture if one is due or the trial has ended."""
         simulator, steps = episodes.simulator, int(episodes.elapsed[0])
         ended = bool(simulator.success[0] or simulator.failure[0]) or steps == self.max_steps
         if steps % STRIDE == 0 or ended:

@@ -1,4 +1,4 @@
-"""Which trials are made: each tool on its own instance, and, in the paper's protocol, every tool on the grid.
+"""The trials: each tool on its own instance and, in the paper's protocol, every tool on the grid.
 
 Shapes: `I` instance.
 """
@@ -18,24 +18,24 @@ from codesign_bench.task.robot import RobotTrials
 
 @dataclass(frozen=True)
 class Trial:
-    """One trial to be made."""
+    """One trial to run."""
 
     kind: str
     """`OWN` or `GRID`."""
     tool: int
-    """Number of the tool, from 1 as in the paper; it is designed for the instance of that number."""
+    """Number of the tool, starting at 1 as in the paper; it is designed for the instance with this number."""
     trial: int
-    """Number among the trials of the same tool and instance, from 1."""
+    """Index among the trials of the same tool and instance, starting at 1."""
     row: int
-    """Of the grid, the farthest from the robot being 0; -1 for the tool's own instance."""
+    """Row of the grid, 0 is the farthest from the robot; -1 for the tool's own instance."""
     column: int
-    """Of the grid, from the left; -1 for the tool's own instance."""
+    """Column of the grid from the left; -1 for the tool's own instance."""
     instance: Floats
     """(I,)."""
 
     @property
     def name(self) -> str:
-        """Unique among the trials of a deployment."""
+        """Unique name within a deployment."""
         place = f"-row-{self.row}-column-{self.column}" if self.kind == GRID else ""
         return f"{self.kind}-tool-{self.tool}{place}-trial-{self.trial}"
 
@@ -54,7 +54,7 @@ def own_trials(trials: RobotTrials, tools: Sequence[int], count: int) -> Iterato
 
 
 def grid_trials(trials: RobotTrials, tools: Sequence[int]) -> Iterator[Trial]:
-    """Yield one trial of each tool on every start of the grid; none where the task has no grid."""
+    """Yield one trial of each tool on every start of the grid; none if the task has no grid."""
     for tool in tools:
         for row, column in np.ndindex(trials.grid.shape[:2]):
             yield Trial(GRID, tool, 1, row, column, trials.grid[row, column])

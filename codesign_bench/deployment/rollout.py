@@ -23,24 +23,24 @@ METRE = "m"
 
 @dataclass(frozen=True)
 class Rollout:
-    """How a trial went."""
+    """The result of a trial."""
 
     success: bool
     failure: bool
-    """Whether it was lost for good."""
+    """Whether the trial ended in failure."""
     outcome: float
-    """The task's outcome at its end, in the outcome's unit."""
+    """The task's outcome at the end, in the outcome's unit."""
     steps: int
-    """Control steps."""
+    """Number of control steps."""
     physics: Physics
     arm: ArmReport
 
 
 class Deployment:
-    """A task's policy on an arm under given conditions, trial after trial.
+    """A task's policy on an arm under given conditions, for a series of trials.
 
     Raises:
-        UserError: the task cannot be deployed, or the conditions mean nothing.
+        UserError: the task cannot be deployed, or a condition is invalid.
     """
 
     def __init__(self, task: Task, policy: Behaviour, conditions: Conditions) -> None:
@@ -52,7 +52,7 @@ class Deployment:
         self._lengths = np.array([unit == METRE for unit in task.state_space.units])
 
     def unit_design(self, instance: Floats) -> Floats:
-        """Return the design (D,) in [-1, 1] that the policy makes for an instance (I,), measured without noise."""
+        """Return the policy's design (D,) in [-1, 1] for an instance (I,), observed without noise."""
         (design,) = np.asarray(self.policy.design(first_observations(self.episodes, instance[None])), dtype=np.float64)
         return np.asarray(design)
 
@@ -63,11 +63,11 @@ class Deployment:
         rng: np.random.Generator,
         watch: Callable[[Episodes], None] | None = None,
     ) -> Rollout:
-        """Try a design (D,) in [-1, 1] on an instance (I,), until it ends or the trial's steps are over.
+        """Play a trial of a design (D,) in [-1, 1] on an instance (I,), until it ends or reaches the step limit.
 
         Args:
             instance: in the instance space's units.
-            unit_design: the tool, whatever instance it was made for.
+            unit_design: the tool, possibly designed for another instance.
             rng: draws noise and physics.
             watch: called right after the design step and after every control step.
         """
@@ -93,7 +93,7 @@ class Deployment:
         )
 
     def _observe(self, seen: deque[Singles], rng: np.random.Generator) -> Singles:
-        """Return what the policy is told (1, O): a state that is late and noisy; goal, design and phase are neither."""
+        """Return the policy's observation (1, O): state with delay and noise, goal, design and phase without."""
         result = self.episodes.observation.copy()
         state = result[:, self.episodes.layout.state]
         if self.conditions.observation_noise > 0.0:

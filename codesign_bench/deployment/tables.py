@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 
 FOLDER = "deployment"
 PROTOCOL_FILE, TRIALS_FILE = "protocol.csv", "trials.csv"
-"""Of the paper's whole protocol, and of trials that a user chose."""
+"""Tables of the paper's full protocol, and of trials chosen by a user."""
 SUMMARY_SUFFIX = ".json"
 PICTURES_FOLDER = "rollouts"
 OWN, GRID = "own", "grid"
-"""Kinds of trials: on the instance that the tool was designed for, or on a start of the grid."""
+"""Kinds of trials: on the tool's own instance, or on a start of the grid."""
 INCIDENTS = tuple(field.name for field in fields(ArmReport) if field.name.endswith("_steps"))
-"""What is counted of the arm, in control steps."""
+"""Counted events of the arm, in control steps."""
 
 
 def row(task: Task, trials: RobotTrials, instance: Floats, rollout: Rollout, **where: Any) -> dict[str, Any]:
-    """Return one table row: which trial (`where`), its instance (I,) by name, how it went, and the arm's incidents."""
+    """Return one table row: the trial (`where`), its instance (I,) by name, its result, and the arm's incidents."""
     missing = abs(rollout.outcome - trials.success_outcome)
     return {
         "task": task.name,
@@ -70,7 +70,7 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def load_deployment(results: str | Path) -> pd.DataFrame:
-    """Return the trials of the paper's protocol below `results`, one row each, all tasks below each other.
+    """Return the trials of the paper's protocol below `results`, one row each, for all tasks.
 
     Raises:
         UserError: there are none.

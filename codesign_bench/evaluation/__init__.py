@@ -1,1 +1,1 @@
-"""Playing finished policies and scripts: evaluation, pictures, design sensitivity, starts around the region, times."""
+"""Play finished policies and scripts: evaluation, pictures, design sensitivity, starts around the region, timing."""

@@ -1,4 +1,4 @@
-"""Judge a policy on a task's fixed evaluation instances, acting with the mean.
+"""Evaluate a policy on a task's fixed evaluation instances, acting with its means.
 
 Shapes: `N` evaluation instances, `I` instance, `D` design.
 """
@@ -26,7 +26,7 @@ class Evaluation:
     designs: Floats
     """(N, D) in the design space's units."""
     returns: Floats
-    """(N,) undiscounted sums of reward, the trade-off's share included."""
+    """(N,) undiscounted returns, including the trade-off reward."""
     successes: Booleans
     """(N,)"""
     lengths: Floats
@@ -34,7 +34,7 @@ class Evaluation:
     material: Floats
     """(N,) d_used / d_max of equation 1."""
     outcomes: Floats
-    """(N,) the task's outcome quantity at the end."""
+    """(N,) the task's outcome at the end."""
     effort: Floats
     """(N,) mean c_used / c_max of equation 1 over the episode."""
 
@@ -61,11 +61,11 @@ def evaluate(
     """Run one episode of `policy` on each of `instances`.
 
     Args:
-        task: what is played.
+        task: the task.
         policy: designs and acts.
-        tradeoff: added to the task's reward, if given.
-        instances: (N, I) in the instance space's units; None: the task's fixed ones.
-        simulators: lends the simulator; None: one is made for this evaluation.
+        tradeoff: added to the task's reward if given.
+        instances: (N, I) in the instance space's units; None: the task's fixed evaluation instances.
+        simulators: lends the simulator; None: a new one.
     """
     instances = task.evaluation_instances() if instances is None else instances
     lender = Simulators(task) if simulators is None else simulators
@@ -102,7 +102,7 @@ def _play(episodes: Episodes, policy: Behaviour, instances: Floats) -> Evaluatio
 def rows(task: Task, evaluation: Evaluation, cutout: float = 0.0) -> Iterator[dict[str, Any]]:
     """Yield one table row per instance: instance and design by entry name, and the outcome.
 
-    With a `cutout`, `in_cutout` tells the instances that were held out.
+    With a `cutout`, `in_cutout` marks the held-out instances.
     """
     unseen = None if cutout == 0.0 else task.in_cutout(evaluation.instances, cutout)
     for index in range(len(evaluation.returns)):

@@ -1,7 +1,7 @@
-"""What trained policies reach on positions just outside the region that they were trained on (paper, section 5.2).
+"""Performance of trained policies on positions just outside the training region (paper, section 5.2).
 
-The evaluation instances of a task lie inside its region; these lie around it, in a rim of `RIM` times its extent. The
-tables lie beside the cells, one per task, method and variant; every finished policy is played once.
+The evaluation instances of a task are inside its region; these are around it, in a rim of `RIM` times its extent. The
+tables are next to the cells, one per task, method and variant; every finished policy is played once.
 
 Shapes: `N` instances, `I` instance, `B` batch, `D` design, `C` control.
 """
@@ -30,16 +30,16 @@ if TYPE_CHECKING:
 
 FOLDER = "outside_region"
 RIM = 0.1
-"""How far instances lie outside at most, as a share of the region's extent along each axis (ours)."""
+"""Largest distance of instances from the region, as a fraction of its extent along each axis (ours)."""
 INSTANCES = 64
-"""Instances drawn around the region (ours)."""
+"""Number of instances drawn around the region (ours)."""
 COLUMNS = ("task", "method", "seed", "instance", "return", "success")
 
 
 def outside_instances(task: Task) -> Floats:
-    """Return up to `INSTANCES` instances (N, I) around the training region, without those that doing nothing solves.
+    """Return up to `INSTANCES` instances (N, I) around the training region, without those that an idle tool solves.
 
-    Positions are drawn from around their ranges, all other entries from theirs.
+    Positions are drawn from around their ranges, all other entries from within their ranges.
 
     Raises:
         UserError: the task has no positions.
@@ -58,12 +58,12 @@ def outside_instances(task: Task) -> Floats:
 def load_or_measure(
     results: Path, pairs: Sequence[tuple[str, str]], log: Log, measure_missing: bool, variant: Variant = DEFAULT
 ) -> pd.DataFrame:
-    """Return what the finished cells of each (task, method) in a variant reach outside, one row per seed and instance.
+    """Return the results of finished cells of each (task, method) in a variant, one row per seed and outside instance.
 
-    Seeds that were finished since, and whose policies are there, count as missing.
+    Seeds that finished after the last measurement and have their policies count as missing.
 
     Raises:
-        UserError: nothing is measured yet and nothing may be, or can be, measured.
+        UserError: nothing is measured yet, and nothing may or can be measured.
     """
     import pandas as pd
 
@@ -85,7 +85,7 @@ def load_or_measure(
 
 
 def load_outside(results: Path) -> pd.DataFrame:
-    """Return what was measured of cells that vary nothing, all tasks and methods below each other.
+    """Return the measurements of default cells, for all tasks and methods.
 
     Raises:
         UserError: nothing is measured yet.
@@ -101,7 +101,7 @@ def _path(results: Path, task: str, method: str, variant: Variant) -> Path:
 
 
 def _finished(results: Path, task: str, method: str, variant: Variant) -> dict[int, StoredCell]:
-    """Return the finished cells that hold their policies, by seed."""
+    """Return the finished cells with policies, by seed."""
     wanted = (task, method, variant)
     return {
         cell.record.seed: cell

@@ -1,4 +1,4 @@
-"""Pictures of behaviour: a few episodes side by side as an animation, or their moments as one picture.
+"""Pictures of behaviour: a few episodes side by side as an animation, or moments of them as one picture.
 
 Shapes: `E` episodes, `T` moments, `O` observation, `D` design, `C` control; a frame is (height, width, 3) in RGB.
 """
@@ -21,20 +21,20 @@ from codesign_bench.task.play import play
 
 SUFFIXES = (".gif", ".png")
 FRAMES_PER_SECOND = 15.0
-"""Most frames per second of simulated time; GIFs cannot show many more."""
+"""Largest number of frames per second of simulated time; GIFs cannot show many more."""
 END_SECONDS = 1.0
-"""How long an animation stands still at its end, s."""
+"""Pause at the end of an animation, s."""
 MOMENTS = 8
-"""Moments of an episode in one picture, the start and the end included."""
+"""Number of moments of an episode in one picture, including start and end."""
 SHEET_SAMPLES = 40
-"""A picture's moments are chosen among about so many, evenly spread over the horizon."""
+"""A picture's moments are chosen from about this many, evenly spaced over the horizon."""
 CAPTION_PIXELS = 16
 CAPTION_COLOUR, PAPER = "#202020", "#ffffff"
 
 
 @dataclass(frozen=True)
 class Moment:
-    """What is seen at one moment of each of E episodes; of an episode that is over, its end."""
+    """Pictures of E episodes at one moment; of an episode that is over, its end."""
 
     frames: list[Frame]
     captions: list[str]
@@ -46,10 +46,10 @@ def render(task: Task, behaviour: Behaviour, path: Path, episodes: int = 4) -> s
     """Write `behaviour` on the task's first evaluation instances to `path`, a GIF or a PNG; return a line about it.
 
     Raises:
-        UserError: another suffix, a task without pictures, or a path that cannot be written.
+        UserError: an unknown suffix, a task without pictures, or a path that is not writable.
     """
     if path.suffix.lower() not in SUFFIXES:
-        raise UserError(f"--out {path}: pictures end in {' or '.join(SUFFIXES)}")
+        raise UserError(f"--out {path}: the file must end in {' or '.join(SUFFIXES)}")
     animated = path.suffix.lower() == ".gif"
     stride = _stride(task) if animated else max(1, task.horizon // SHEET_SAMPLES)
     moments = list(_moments(task, behaviour, episodes, stride))
@@ -64,7 +64,7 @@ def render(task: Task, behaviour: Behaviour, path: Path, episodes: int = 4) -> s
 
 
 def _moments(task: Task, behaviour: Behaviour, count: int, stride: int) -> Iterator[Moment]:
-    """Play the first `count` evaluation instances side by side and yield every `stride`-th step and every end."""
+    """Play the first `count` evaluation instances in parallel; yield every `stride`-th step and every end."""
     instances = task.evaluation_instances()[:count]
     episodes = Episodes(task, len(instances))
     total, over = np.zeros(len(instances)), np.zeros(len(instances), dtype=bool)
@@ -100,12 +100,12 @@ def _captions(episodes: Episodes, total: np.ndarray) -> list[str]:
 
 
 def _stride(task: Task) -> int:
-    """Return how many control steps one frame of an animation stands for."""
+    """Return the number of control steps per frame of an animation."""
     return max(1, round(1.0 / (FRAMES_PER_SECOND * task.control_period)))
 
 
 def animation(moments: list[Moment], period: float) -> bytes:
-    """Return a GIF with a moment every `period` s that stands still at its end."""
+    """Return a GIF with one moment every `period` s and a pause at the end."""
     pictures = [Image.fromarray(np.concatenate(_captioned(moment), axis=1)) for moment in moments]
     durations = [round(1000.0 * period)] * (len(pictures) - 1) + [round(1000.0 * END_SECONDS)]
     data = io.BytesIO()
@@ -115,7 +115,7 @@ def animation(moments: list[Moment], period: float) -> bytes:
 
 
 def _sheet(moments: list[Moment]) -> bytes:
-    """Return a PNG with one row per episode, its own moments from start to end beside each other."""
+    """Return a PNG with one row per episode: its moments from start to end."""
     pictures = [_captioned(moment) for moment in moments]
     rows = []
     for episode in range(len(moments[0].frames)):

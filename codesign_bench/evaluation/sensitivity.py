@@ -1,7 +1,7 @@
-"""How much a tool's design decides: one scripted controller, many tools, many goals.
+"""Design sensitivity: how much the tool matters with one scripted controller, many tools and many goals.
 
-A task's script controls every tool on every goal; nothing learns. A task whose design matters shows tools that differ
-widely, and no tool that solves every goal. The tables lie beside the cells, one per task, and are measured once.
+A task's script controls every tool on every goal, without learning. If the design matters, tools differ widely and no
+tool solves every goal. The tables are next to the cells, one per task, and are measured once.
 
 Shapes: `K` tools, `G` goals (evaluation instances), `D` design.
 """
@@ -32,18 +32,18 @@ if TYPE_CHECKING:
 FOLDER = "design_sensitivity"
 RANDOM_TOOLS = 200
 GOALS = 16
-"""The first of the task's evaluation instances."""
+"""Number of goals: the first of the task's evaluation instances."""
 EPISODES_AT_ONCE = 64
 
 RANDOM, SCRIPTED = "random", "scripted"
-"""Kinds of tools: uniform in the design space, or the script's own for one of the goals."""
+"""Kinds of tools: uniform in the design space, or designed by the script for one of the goals."""
 
 COLUMNS = ("task", "tool", "kind", "goal", "own", "outcome", "return", "success", "outcome_name", "outcome_unit")
-"""`own` marks a scripted tool on the goal that it was made for."""
+"""`own` marks a scripted tool on the goal for which it was designed."""
 
 
 def tools_of(task: Task, goals: Floats, random_tools: int = RANDOM_TOOLS) -> Floats:
-    """Return (K, D) normalised designs: random ones, then the script's own for each of `goals` (G, I)."""
+    """Return (K, D) normalised designs: random ones, then the script's design for each of `goals` (G, I)."""
     rng = generator(EVALUATION_SEED, f"tools for {task.name}")
     random = rng.uniform(-1.0, 1.0, size=(random_tools, task.design_space.size))
     scripted = np.asarray(task.script().design(first_observations(Episodes(task, len(goals)), goals)), dtype=np.float64)
@@ -54,13 +54,13 @@ def measure(name: str, random_tools: int = RANDOM_TOOLS, goals: int = GOALS, job
     """Return the outcome of every tool on every goal of the task `name`, one row each, with `COLUMNS`.
 
     Raises:
-        UserError: the task has no script, or tells no outcome.
+        UserError: the task has no script or no outcome.
     """
     import pandas as pd
 
     task = load_task(name)
     if task.outcome is None:
-        raise UserError(f"task '{name}' tells no outcome")
+        raise UserError(f"task '{name}' has no outcome")
     instances = task.evaluation_instances()[:goals]
     designs = tools_of(task, instances, random_tools)
     tool, goal = (index.ravel() for index in np.indices((len(designs), len(instances))))
@@ -85,10 +85,10 @@ def measure(name: str, random_tools: int = RANDOM_TOOLS, goals: int = GOALS, job
 
 
 def measure_missing(results: Path, tasks: Iterable[str], log: Log) -> None:
-    """Measure the tables of `tasks` that are missing below `results`; tasks that cannot be measured are left out.
+    """Measure the tables of `tasks` that are missing below `results`; tasks that cannot be measured are skipped.
 
     Raises:
-        UserError: the folder cannot be written.
+        UserError: the folder is not writable.
     """
     for name in tasks:
         path = _path(results, name)

@@ -1,4 +1,4 @@
-"""How long methods took to train, from the cells' own records, and how long their policies take to act, measured now.
+"""Training times of methods, from the cells' records, and inference times of their policies, measured now.
 
 Shapes: `O` observation.
 """
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 CALLS = 200
-"""Calls of a policy that are timed, one observation each."""
+"""Number of timed calls of a policy, with one observation each."""
 
 
 def timing_frame(results: Path) -> pd.DataFrame:
     """Return one row per finished cell of the default variant below `results`.
 
-    Columns: task, method, label, seed, profile, env_steps, train_s (training alone, without evaluation), cores (of the
+    Columns: task, method, label, seed, profile, env_steps, train_s (without evaluation), cores (of the
     cell), cpu, inference_s (median time of one control step's policy call; one seed per task and method is timed, NaN
     elsewhere).
 
@@ -65,7 +65,7 @@ def timing_frame(results: Path) -> pd.DataFrame:
 
 
 def inference_seconds(cell: StoredCell) -> float:
-    """Return the median time of one call of the cell's policy in the control phase, on one observation, in s."""
+    """Return the median time of one call of the cell's policy in the control phase with one observation, s."""
     task, policy = load_task(cell.record.task), policy_of(cell)
     episodes = Episodes(task, 1)
     designed(episodes, policy, task.evaluation_instances()[:1])

@@ -1,1 +1,1 @@
-"""From a design to a solid that can be printed."""
+"""Convert designs to printable solids."""

@@ -1,4 +1,4 @@
-"""`codesign-bench export`: write the tools that a policy designs as solids to print, each with a sheet.
+"""`codesign-bench export`: write the tools of a policy as printable meshes, each with a data sheet.
 
 Shapes: `I` instance, `D` design, `T` tools, `N` instances.
 """
@@ -35,14 +35,14 @@ TABLE_FILE = "tools.csv"
 
 @dataclass(frozen=True)
 class Order:
-    """Whose tools to write."""
+    """The instances for which tools are written."""
 
     labels: tuple[str, ...]
     """A name for each instance."""
     instances: Floats
     """(N, I) in the instance space's units."""
     scale: float = 1.0
-    """Size of the prints over that of the tools."""
+    """Scale of the prints relative to the tools."""
 
     @classmethod
     def of(
@@ -53,12 +53,12 @@ class Order:
         instances: str | None = None,
         scale: float = 1.0,
     ) -> Order:
-        """Return the order that exactly one of `start`, `goal` and `instances` means, as the command line has them.
+        """Return the order for exactly one of `start`, `goal` and `instances`, in the form of the command line.
 
-        What a start or a goal leaves open of an instance is taken from the first evaluation instance.
+        Other entries of an instance are taken from the first evaluation instance.
 
         Raises:
-            UserError: a value means nothing for the task.
+            UserError: a value is invalid for the task.
         """
         if not (math.isfinite(scale) and scale > 0.0):
             raise UserError(f"--scale must be positive, not {scale}")
@@ -81,21 +81,21 @@ class Order:
 def export(
     task: Task, policy: Behaviour, order: Order, out: Path, say: Callable[[str], None], source: str = ""
 ) -> list[Print]:
-    """Write the tools that `policy` designs for the instances of `order` into `out`; return what printing them takes.
+    """Write the tools of `policy` for the instances of `order` to `out`; return the properties of their prints.
 
-    Every tool gets STL, OBJ, a JSON sheet and a picture; tools that are the same for several instances are written
-    once. A table has one row per tool.
+    Every tool gets STL, OBJ, a JSON sheet and a picture; a tool that is the same for several instances is written once.
+    A table has one row per tool.
 
     Args:
-        task: the policy's.
+        task: the policy's task.
         policy: designs the tools.
-        order: for which instances, and how large.
-        out: a folder, made if it is not there.
-        say: tells the user a line.
-        source: where the policy comes from, for the sheets.
+        order: instances and scale.
+        out: a folder; created if missing.
+        say: prints a line.
+        source: source of the policy, for the sheets.
 
     Raises:
-        UserError: a file is there already, `out` cannot be written, or the extra `export` is not installed.
+        UserError: a file already exists, `out` is not writable, or the extra `export` is not installed.
     """
     designs, owners = np.unique(_designs(task, policy, order.instances), axis=0, return_inverse=True)
     first = [int(np.flatnonzero(owners == tool)[0]) for tool in range(len(designs))]
@@ -142,20 +142,20 @@ def file_content(mesh: Trimesh, kind: str) -> bytes:
 
 
 def _designs(task: Task, policy: Behaviour, instances: Floats) -> Floats:
-    """Return the tools (N, D), in the design space's units, that `policy` designs for `instances` (N, I)."""
+    """Return the designs (N, D) of `policy` for `instances` (N, I), in the design space's units."""
     parts = portions(len(instances), task)
     return np.concatenate([designed(Episodes(task, len(part)), policy, instances[part]) for part in parts])
 
 
 def _open(out: Path, files: Iterable[str]) -> None:
-    """Make the folder `out`; refuse when one of `files` is there."""
+    """Make the folder `out`; raise an error if one of `files` already exists."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"--out {out}: not writable ({error.strerror})") from error
     for name in (TABLE_FILE, *files):
         if (out / name).exists():
-            raise UserError(f"--out {out}: {name} is there already; choose another folder")
+            raise UserError(f"--out {out}: {name} already exists; choose another folder")
 
 
 def _numbers_of_instances(text: str, count: int) -> list[int]:
@@ -166,7 +166,7 @@ def _numbers_of_instances(text: str, count: int) -> list[int]:
     except ValueError:
         chosen = [-1]
     if any(not 0 <= number < count for number in chosen):
-        raise UserError(f"--instances {text}: name evaluation instances from 0 to {count - 1}, or {ALL}")
+        raise UserError(f"--instances {text}: give numbers of evaluation instances, 0 to {count - 1}, or {ALL}")
     return chosen
 
 

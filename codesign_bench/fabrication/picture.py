@@ -14,7 +14,7 @@ LIGHT = np.array([0.3, -0.5, 0.81])
 COLOUR = np.array([0.0, 0.447, 0.698])
 """Blue of the figures' colour-blind safe palette."""
 LARGEST_TRIANGLE = 1 / 15
-"""Of the picture's width: matplotlib sorts whole triangles by depth, and long ones badly."""
+"""Longest edge as a fraction of the picture's width: matplotlib sorts whole triangles by depth, long ones wrongly."""
 
 
 def picture(mesh: Trimesh, title: str) -> bytes:

@@ -1,4 +1,4 @@
-"""What a printer makes of a solid: mass, whether it fits the bed, whether its walls are thick enough.
+"""Printability of a solid: mass, fit on the print bed, wall thickness.
 
 Shapes: `N` points.
 """
@@ -16,35 +16,35 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 BED = (220.0, 220.0, 250.0)
-"""Width, depth and height that a common desktop printer fills, mm (ours)."""
+"""Width, depth and height of the build volume of a common desktop printer, mm (ours)."""
 LINE_WIDTH = 0.4
-"""Of a common nozzle, mm (ours)."""
+"""Line width of a common nozzle, mm (ours)."""
 THINNEST_WALL = 2.0 * LINE_WIDTH
-"""A wall has an inner and an outer line, mm (ours)."""
+"""Smallest wall thickness, an inner and an outer line, mm (ours)."""
 PLA_DENSITY = 1240.0
-"""kg/m^3 (data sheets of PLA filament)."""
+"""Density of PLA, kg/m^3 (data sheets of PLA filament)."""
 CUBIC_MILLIMETRES = 1e9
-"""In a cubic metre."""
+"""Cubic millimetres per cubic metre."""
 TURNS = np.deg2rad(np.arange(0.0, 90.0, 1.0))
-"""Turns about the vertical that are tried on the bed, rad: a quarter turn only swaps width and depth."""
+"""Rotations about the vertical that are tried, rad: a quarter turn only swaps width and depth."""
 AXES = "xyz"
 
 
 @dataclass(frozen=True)
 class Placement:
-    """How a solid lies on the bed."""
+    """Placement of a solid on the bed."""
 
     up: str
     """Which of its axes is vertical."""
     turn: float
-    """Its turn about the vertical, degrees."""
+    """Its rotation about the vertical, degrees."""
     largest_scale: float
-    """How many times as large it could be and still fit; below 1 it does not fit."""
+    """Largest scale at which it fits; below 1 it does not fit."""
 
 
 @dataclass(frozen=True)
 class Print:
-    """What is known of a solid before it is printed; lengths in mm."""
+    """Properties of a solid before printing; lengths in mm."""
 
     watertight: bool
     bodies: int
@@ -59,21 +59,21 @@ class Print:
     """Along x, y and z."""
     bed_mm: tuple[float, float, float]
     placement: Placement
-    """The best of those tried."""
+    """The best placement found."""
     fits_bed: bool
     thinnest_wall_mm: float
     thinnest_wall_allowed_mm: float
     problems: list[str]
-    """Why it cannot be printed in one piece; empty when it can."""
+    """Why it cannot be printed in one piece; empty if it can."""
 
     @property
     def printable(self) -> bool:
-        """Whether nothing speaks against printing it."""
+        """Whether it can be printed in one piece."""
         return not self.problems
 
 
 def judge(mesh: Trimesh, thinnest_wall: float) -> Print:
-    """Return what a printer makes of `mesh`, in mm, whose thinnest part is `thinnest_wall` mm thick."""
+    """Return the printability of `mesh`, in mm, whose thinnest part is `thinnest_wall` mm thick."""
     placement = place_on_bed(np.asarray(mesh.convex_hull.vertices))
     bodies, watertight = int(mesh.body_count), bool(mesh.is_volume)
     sides = np.asarray(mesh.extents)
@@ -109,9 +109,9 @@ def judge(mesh: Trimesh, thinnest_wall: float) -> Print:
 
 
 def place_on_bed(points: Floats) -> Placement:
-    """Return how the convex hull of `points` (N, 3), in mm, best lies on the bed.
+    """Return the best placement of the convex hull of `points` (N, 3), in mm, on the bed.
 
-    Each axis is tried as the vertical one, z first, with turns about it by whole degrees.
+    Each axis is tried as the vertical one, z first, with rotations about it in steps of one degree.
     """
     tried = []
     for up in (2, 1, 0):

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 MILLIMETRES = 1000.0
-"""In a metre."""
+"""Millimetres per metre."""
 ROUND_SECTIONS = 64
-"""Sides of the polygon that stands for a round end."""
+"""Number of sides of the polygon for a round end."""
 PRECISION = 1e-3
-"""Finer details of a union are smoothed away, mm.
+"""Details of a union below this size are removed, mm.
 
-Parts that nearly touch leave slivers that the single precision of STL files would close or tear open.
+Parts that nearly touch leave slivers, which the single precision of STL files would close or open.
 """
 
 
@@ -35,11 +35,11 @@ class Solid:
 
     mesh: Trimesh
     fillet_volume: float
-    """How much of it fills joints whose parts only touch, mm^3."""
+    """Volume added at joints whose parts only touch, mm^3."""
 
 
 def handle_of(task: Task) -> tuple[ToolPart, ...]:
-    """Return what a gripper holds a task's printed tools by; no part where they have a handle of their own."""
+    """Return the parts of the gripper's handle on a task's printed tools; none if the tools have a handle."""
     return () if task.deployment is None else task.deployment.gripper_handle()
 
 
@@ -47,9 +47,9 @@ def tool_solid(task: Task, design: Floats, scale: float = 1.0) -> Solid:
     """Return the tool of a design (D,), in the design space's units, as one solid with the gripper's handle.
 
     Args:
-        task: whose tool.
+        task: the tool's task.
         design: its parameters.
-        scale: size of the solid over the tool's own.
+        scale: scale of the solid relative to the tool.
 
     Raises:
         UserError: the extra `export` is not installed, or the task does not define the parts of its tools.
@@ -62,10 +62,10 @@ def tool_solid(task: Task, design: Floats, scale: float = 1.0) -> Solid:
 
 
 def united(parts: Sequence[ToolPart], joints: Iterable[tuple[int, int]]) -> Solid:
-    """Return the union of `parts`; those of each of `joints` are bonded where they only touch.
+    """Return the union of `parts`; the two parts of each of `joints` are bonded if they only touch.
 
-    Two boxes may meet in an edge, as the leaning plates of the 3D scoop do: nothing holds them together in print. Then
-    the joint is filled with the convex hull of what each part has within half the thinner one's thickness of the other.
+    Two boxes may meet only in an edge, like the leaning plates of the 3D scoop, and would fall apart in print. Such a
+    joint is filled with the convex hull of the regions of both parts within half the smaller thickness of each other.
     """
     trimesh = _trimesh()
     meshes = [part_mesh(part) for part in parts]
@@ -84,7 +84,7 @@ def united(parts: Sequence[ToolPart], joints: Iterable[tuple[int, int]]) -> Soli
 
 
 def part_mesh(part: ToolPart) -> Trimesh:
-    """Return a part as a solid in mm; planar parts are extruded to be as high as they are wide, about height 0."""
+    """Return a part as a solid in mm; planar parts are extruded about height 0 to be as high as they are wide."""
     trimesh = _trimesh()
     if isinstance(part, BoxPart):
         x, y, z, w = part.rotation
@@ -104,7 +104,7 @@ def thickness(part: ToolPart) -> float:
 
 
 def scaled(part: ToolPart, scale: float) -> ToolPart:
-    """Return a part `scale` times as large, the held point staying where it is."""
+    """Return a part scaled by `scale` about the held point."""
     if isinstance(part, BoxPart):
         (half_x, half_y, half_z), (x, y, z) = part.half_extents, part.centre
         half_extents = (scale * half_x, scale * half_y, scale * half_z)
@@ -114,7 +114,7 @@ def scaled(part: ToolPart, scale: float) -> ToolPart:
 
 
 def grown(part: ToolPart, reach: float) -> ToolPart:
-    """Return a part whose faces lie `reach` (m) further out."""
+    """Return a part with its faces moved outwards by `reach`, m."""
     if isinstance(part, BoxPart):
         half_x, half_y, half_z = part.half_extents
         return replace(part, half_extents=(half_x + reach, half_y + reach, half_z + reach))
@@ -141,7 +141,7 @@ def _is_one_solid(mesh: Trimesh) -> bool:
 
 def _trimesh() -> ModuleType:
     try:
-        import manifold3d  # noqa: F401  # trimesh finds its boolean engine by itself
+        import manifold3d  # noqa: F401  # trimesh uses it as its boolean engine
         import trimesh
     except ModuleNotFoundError as error:
         raise UserError("export needs trimesh and manifold3d: pip install 'codesign-bench[export]'") from error

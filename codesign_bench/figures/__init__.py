@@ -1,1 +1,1 @@
-"""Figures from results: where their numbers come from, and how files are made of them."""
+"""Figures from results: data sources and drawing."""

@@ -1,4 +1,4 @@
-"""Put curves of other results beside one's own: `codesign-bench plot --compare`."""
+"""Compare curves with those of other results: `codesign-bench plot --compare`."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FROM = " from "
-"""Between a method's name and the folder that its compared results come from."""
+"""Separates a method's name from the folder of its compared results."""
 
 
 def with_compared(own: pd.DataFrame, other: Path) -> pd.DataFrame:
-    """Return one's own curves and, below them, those that `other` holds on the same tasks.
+    """Return the curves of `own`, followed by those of `other` on the same tasks.
 
-    A compared method is called "METHOD from FOLDER", in its label, too, so that figures keep it apart.
+    A compared method is named "METHOD from FOLDER", also in its label, so that figures distinguish it.
 
     Args:
-        own: rows as `load_results` gives them.
+        own: rows of `load_results`.
         other: a results folder.
 
     Raises:
@@ -36,10 +36,10 @@ def with_compared(own: pd.DataFrame, other: Path) -> pd.DataFrame:
 
 
 def method_of(name: str) -> str:
-    """Return the method that a name stands for, wherever its results come from."""
+    """Return the method of a name, with or without a folder of compared results."""
     return name.partition(FROM)[0]
 
 
 def is_compared(name: str) -> bool:
-    """Return whether a name stands for results that one's own are compared with."""
+    """Return whether a name is that of compared results."""
     return FROM in name

@@ -1,4 +1,4 @@
-"""Pictures of the tools that designers made, for goals spread over the goal space, as finished cells recorded them.
+"""Pictures of designed tools, recorded by finished cells, for goals spread over the goal space.
 
 Shapes: `N` evaluation instances, `G` goal, `I` instance.
 """
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MAP_SIDE = 3
-"""A map: two entries are cut into so many stretches each, with one picture per field."""
+"""A map: the ranges of two entries are divided into this many intervals each, with one picture per field."""
 LINE_LENGTH = 8
-"""A line: most pictures of one entry, all in one row."""
+"""A line: largest number of pictures over one entry, all in one row."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Which evaluation instance is drawn, and where in a grid; row 0 is the top."""
+    """An evaluation instance and its position in a grid; row 0 is the top."""
 
     instance: int
     row: int
@@ -44,11 +44,11 @@ def designed_tools(request: Request) -> pd.DataFrame:
     """Return pictures of the tools of one designer per task and variant, right after the design step.
 
     Variants are `default` and those of the trade-off. The designer is the first method in the order of methods that
-    has a finished cell there, with its lowest seed, so that nobody chose it by its results.
+    has a finished cell there, with its lowest seed, so that results play no part in the choice.
 
     Returns:
         The columns of `load_evaluations`, one row per picture, with `title` (the task's), `row` and `column` (place in
-        the task's grid), `across` and `up` (what changes along columns and, from below, along rows; `up` is empty where
+        the task's grid), `across` and `up` (what changes along columns and, from below, along rows; `up` is empty if
         goals have one entry), `goal` (that goal in words) and `picture` (height, width, 3).
 
     Raises:
@@ -70,10 +70,10 @@ def designed_tools(request: Request) -> pd.DataFrame:
 
 
 def spread(goals: Floats) -> list[Place]:
-    """Choose instances that cover the goals (N, 1 or 2), at most one per field of an even grid, nearest to its centre.
+    """Choose instances that cover the goals (N, 1 or 2): at most one per field of a grid, nearest to its centre.
 
-    Goals of one entry make a line from low to high, with one instance per value where these are few; goals of two make
-    a map, the second entry upwards. Fields without goals stay empty on a map and are passed over on a line.
+    Goals with one entry form a line from low to high, with one instance per value if there are few values. Goals with
+    two entries form a map, the second entry upwards. Fields without goals are empty on a map and skipped on a line.
     """
     goals = np.asarray(goals, dtype=np.float64)
     if goals.shape[1] == 1:
@@ -99,7 +99,7 @@ def _along_a_line(values: Floats) -> list[int]:
 
 
 def _stretches(values: Floats, count: int) -> tuple[NDArray[np.int_], Floats]:
-    """Return in which of `count` stretches of their range values (N,) lie, and how far from its middle."""
+    """Return which of `count` intervals of their range the values (N,) are in, and their distances from its middle."""
     low, high = values.min(), values.max()
     place = count * (values - low) / max(high - low, 1e-12)
     stretch = np.minimum(place.astype(np.int_), count - 1)
@@ -137,7 +137,7 @@ def _pictures(task: Task, cell: pd.DataFrame) -> pd.DataFrame:
 
 
 def _shown(task: Task) -> tuple[str, ...]:
-    """Return the one or two entries of an instance over which tools are spread: its position, or else its goal's."""
+    """Return the one or two entries of an instance for the grid: those of its position, or else of its goal."""
     return task.position_entries or task.goal_space.names[:2]
 
 
@@ -145,12 +145,12 @@ def _entries(cell: pd.DataFrame, kind: str, space: Box) -> Floats:
     """Return the columns of a space's entries as (N, size).
 
     Raises:
-        UserError: the cell was made by another version of the task.
+        UserError: the cell is from another version of the task.
     """
     columns = [f"{kind}_{name}" for name in space.names]
     missing = [column for column in columns if column not in cell.columns]
     if missing:
-        raise UserError(f"its evaluation lacks {', '.join(missing)}; was the task another one then?")
+        raise UserError(f"its evaluation lacks {', '.join(missing)}; it may be from another version of the task")
     values: Floats = cell[columns].to_numpy(dtype=np.float64)
     return values
 

@@ -1,9 +1,9 @@
-"""Draw figures from results, and save each as picture, vector graphic and table.
+"""Draw figures from results and save each as picture, vector graphic and table.
 
 A figure is a module with `TITLE`, `data(frame)`, which returns the numbers shown, and `draw(frame)`, which returns a
 matplotlib figure. It may also have `SOURCE`, a function of a `Request` that returns its frame (default: learning
 curves), `NEEDS`, the command that makes what it shows, `texts(frame)`, further files by their ending, and
-`COMPARES = True` where `plot --compare` may overlay the curves of other results.
+`COMPARES = True` if `plot --compare` may overlay the curves of other results.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure drawn from results; where it goes is the caller's affair."""
+    """A figure drawn from results, not yet saved."""
 
     name: str
     title: str
     about: str
-    """What it shows: the first paragraph of its module."""
+    """Description: the first paragraph of its module."""
     table: pd.DataFrame
-    """The numbers that it shows."""
+    """The numbers shown."""
     figure: Figure
     texts: Mapping[str, str]
     """Further files by their ending."""
@@ -54,18 +54,18 @@ def draw_figures(
     compare: Path | None = None,
     study: Study | None = None,
 ) -> None:
-    """Draw `wanted`, or every figure that the results allow, and log the paths; the first figure's picture comes last.
+    """Draw `wanted`, or every figure that can be drawn, and log the paths; the first figure's picture comes last.
 
     Args:
         wanted: names of figures; none: those of `study`.
-        results: where cells lie.
-        out: where figures go.
-        log: shows every path, and what is left out.
-        compare: further results, whose curves are overlaid by figures with `COMPARES`.
-        study: whose figures are drawn if none are named, with those that belong to no study; None: the default one.
+        results: folder of the cells.
+        out: folder of the figures.
+        log: prints every path and what is left out.
+        compare: other results, whose curves are overlaid in figures with `COMPARES`.
+        study: without names, its figures are drawn and those that belong to no study; None: the default study.
 
     Raises:
-        UserError: an unknown figure, a folder that cannot be written, or nothing that can be drawn.
+        UserError: an unknown figure, a folder that is not writable, or no figure can be drawn.
     """
     modules = {name: load_module("paper_figs", name) for name in wanted or figure_names(study)}
     if compare is not None and not any(getattr(module, "COMPARES", False) for module in modules.values()):
@@ -79,7 +79,7 @@ def draw_figures(
     make_folder(out)
     drawn: list[Path] = []
     for drawing in _drawings(modules, Request(results, log, named=bool(wanted)), compare):
-        drawn = [*save(drawing, out), *drawn]  # what comes first is logged last
+        drawn = [*save(drawing, out), *drawn]  # the first figure is logged last
     if not drawn:
         raise UserError(f"nothing in '{results}' can be plotted yet")
     for path in sorted(drawn, key=lambda path: path.suffix == ".png"):
@@ -94,13 +94,13 @@ def figure_names(study: Study | None) -> list[str]:
 
 
 def possible_drawings(results: Path, log: Log, study: Study | None = None) -> Iterator[Drawing]:
-    """Yield every figure of a study that the results allow; `log` shows which are left out, and why."""
+    """Yield every figure of a study that can be drawn; `log` gets those that are left out, and why."""
     modules = {name: load_module("paper_figs", name) for name in figure_names(study)}
     return _drawings(modules, Request(results, log))
 
 
 def save(drawing: Drawing, out: Path) -> list[Path]:
-    """Write numbers, vector graphic, picture and texts of `drawing` into `out` and return their paths."""
+    """Write numbers, vector graphic, picture and texts of `drawing` to `out` and return their paths."""
     paths = [out / f"{drawing.name}.csv", out / f"{drawing.name}.pdf", out / f"{drawing.name}.png"]
     write_bytes(paths[0], csv_bytes(drawing.table))
     for path in paths[1:]:
@@ -113,10 +113,10 @@ def save(drawing: Drawing, out: Path) -> list[Path]:
 
 
 def _drawings(modules: Mapping[str, ModuleType], request: Request, compare: Path | None = None) -> Iterator[Drawing]:
-    """Yield the figures of `modules` one by one, and forget each before the next.
+    """Yield the figures of `modules` one by one, and free each before the next.
 
     Raises:
-        UserError: the results lack something that a figure that was asked for by name needs.
+        UserError: data of a figure that was requested by name are missing.
     """
     frames: dict[Source, pd.DataFrame] = {}
     for name, module in modules.items():
@@ -139,10 +139,10 @@ def _drawings(modules: Mapping[str, ModuleType], request: Request, compare: Path
 
 
 def _draw(name: str, module: Any, frame: pd.DataFrame) -> Drawing:
-    """Return the figure that a module of figures draws from `frame`.
+    """Return the figure of a module, drawn from `frame`.
 
     Raises:
-        UserError: the results lack something that it needs.
+        UserError: data are missing.
     """
     import matplotlib
 
@@ -158,7 +158,7 @@ def _draw(name: str, module: Any, frame: pd.DataFrame) -> Drawing:
 
 
 def _close(figure: Figure) -> None:
-    """Free a figure that was made through pyplot, which else keeps it for good."""
+    """Free a figure that was made through pyplot, which would otherwise keep it."""
     import matplotlib.pyplot as plt
 
     plt.close(figure)
@@ -168,7 +168,7 @@ def make_folder(out: Path) -> None:
     """Make the folder `out`.
 
     Raises:
-        UserError: it cannot be written to.
+        UserError: it is not writable.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)

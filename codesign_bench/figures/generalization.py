@@ -1,4 +1,4 @@
-"""What policies reach on goals and starts that they were never trained on (paper, section 5.2).
+"""Performance on held-out goals and starts (paper, section 5.2).
 
 Shapes: `N` evaluation instances, `P` places, `I` instance.
 """
@@ -22,26 +22,24 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 TRAINING, CUTOUT, OUTSIDE = "training", "cutout", "outside"
-"""Regions of positions: trained on, cut out of what is trained on, and beyond both."""
+"""Regions of positions: training region, cutout region, and outside of both."""
 START, PLACE = "start", "place"
-"""Kinds of rows: an evaluation instance with its outcome, or a place of a fine grid, which tells regions apart."""
+"""Kinds of rows: an evaluation instance with its outcome, or a point of a fine grid that shows the regions."""
 
 ROOM = 0.15
-"""How far the grid of places reaches beyond the training region, as a share of its extent."""
+"""Margin of the grid around the training region, as a fraction of its extent."""
 PLACES = 14_400
-"""Places of a grid, however many axes it has."""
+"""Number of points of a grid, for any number of axes."""
 
 
 def outcomes_by_region(request: Request) -> pd.DataFrame:
-    """Return the evaluations of all cells with a cutout, and the places that tell where the regions lie.
+    """Return the evaluations of all cells with a cutout, and points that show the regions.
 
-    Cells of the same method and task that trained on the whole region stand beside them as fraction 0. What policies
-    reach around the training region, which no evaluation tells, is added as far as it was measured.
+    Cells of the same method and task that trained on the whole region are included as fraction 0. Results around the
+    training region, which are not part of evaluations, are included if they were measured.
 
     Args:
-        results: a results folder.
-        say: is told what is left out or measured.
-        measure: play the policies around the training region that were not played there yet.
+        request: results folder and log; if the figure was named, missing results around the region are measured.
 
     Returns:
         Rows of kind `START`: the columns of `load_evaluations`; rows of kind `PLACE`: task and cutout. Both have kind,
@@ -71,21 +69,21 @@ def outcomes_by_region(request: Request) -> pd.DataFrame:
 
 
 def _around(request: Request, inside: pd.DataFrame) -> Iterator[pd.DataFrame]:
-    """Yield for every task, method and variant of `inside` what its policies reach around the training region."""
+    """Yield, for every task, method and variant of `inside`, its policies' results around the training region."""
     keys = ["task", "method", "label", "variant", "cutout"]
     for task, method, label, variant, cutout in inside[keys].drop_duplicates().itertuples(index=False):
         varied = Variant.of(cutout=cutout or None)
         try:
             table = load_or_measure(request.results, [(task, method)], request.log, request.named, varied)
         except UserError as error:
-            if request.named:  # otherwise it is just not measured yet: the region then has no line
+            if request.named:  # otherwise not measured yet, and the region has no line
                 request.log(f"around the region, {task}/{method}/{variant} left out: {error}")
             continue
         yield table.assign(label=label, variant=variant, cutout=cutout)
 
 
 def regions(task: Task, instances: Floats, fraction: float) -> NDArray[np.str_]:
-    """Return the region of each instance (N, I) when `fraction` of the training region is cut out; 0 cuts out none.
+    """Return the region of each instance (N, I) if `fraction` of the training region is cut out; 0: no cutout.
 
     Raises:
         UserError: the task has no positions.
@@ -102,7 +100,7 @@ def _starts(task: Task, rows: pd.DataFrame) -> pd.DataFrame:
     columns = [f"instance_{name}" for name in task.instance_space.names]
     missing = [column for column in columns if column not in rows.columns]
     if missing:
-        raise UserError(f"its evaluations lack {', '.join(missing)}; was the task another one then?")
+        raise UserError(f"its evaluations lack {', '.join(missing)}; they may be from another version of the task")
     parts = []
     for fraction, group in rows.groupby("cutout"):
         instances = group[columns].to_numpy(dtype=np.float64)

@@ -1,6 +1,6 @@
-"""Where figures get their numbers: what a source is asked, and the sources that several figures share.
+"""Data sources of figures: the request to a source, and sources that several figures share.
 
-A figure names its source as `SOURCE`, a function of a `Request`. One that no other figure has may stand in its file.
+A figure sets `SOURCE` to its source, a function of a `Request`. A source of a single figure may be in its file.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Request:
-    """What a figure asks of its source."""
+    """The request of a figure to its source."""
 
     results: Path
     """The results folder."""
     log: Log = silent
-    """Shows the user a line, e.g. about what is left out."""
+    """Prints a line, e.g. on what is left out."""
     named: bool = False
-    """Whether the user named the figure: then what is missing may be measured, which can take minutes."""
+    """Whether the user named the figure; then missing data may be measured, which can take minutes."""
 
 
 Source: TypeAlias = "Callable[[Request], pd.DataFrame]"
-"""Returns the frame that a figure is drawn from; raises `UserError` where the results lack something."""
+"""Returns the frame for a figure; raises `UserError` if data are missing."""
 
 
 def curves(request: Request) -> pd.DataFrame:
@@ -41,7 +41,7 @@ def curves(request: Request) -> pd.DataFrame:
 
 
 def evaluations(request: Request) -> pd.DataFrame:
-    """Return what every finished cell reached on each evaluation instance."""
+    """Return the final result of every finished cell on each evaluation instance."""
     return load_evaluations(request.results)
 
 
@@ -56,7 +56,7 @@ def design_sensitivity(request: Request) -> pd.DataFrame:
 
 
 def timing(request: Request) -> pd.DataFrame:
-    """Return how long cells took to train, and how long their policies take to act."""
+    """Return the training times of cells and the inference times of their policies."""
     from codesign_bench.evaluation.timing import timing_frame
 
     return timing_frame(request.results)
@@ -70,12 +70,12 @@ def trials_on_an_arm(request: Request) -> pd.DataFrame:
 
 
 def tasks_in(results: Path) -> list[str]:
-    """Return the tasks of which results hold cells.
+    """Return the tasks with cells in `results`.
 
     Raises:
         UserError: there is none.
     """
     found = list(dict.fromkeys(cell.record.task for cell in find_cells(results)))
     if not found:
-        raise UserError(f"no cells in '{results}' yet; name the figure to draw it without any")
+        raise UserError(f"no cells in '{results}' yet; give the figure's name to draw it without cells")
     return found

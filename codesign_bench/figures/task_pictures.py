@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TRIED = 6
-"""The first of a task's evaluation instances, of which the one with the highest return is drawn."""
+"""Number of a task's first evaluation instances that are played; the one with the highest return is drawn."""
 MOMENT = 0.6
-"""Which share of the episode has passed: the tool has met the object and has not finished."""
+"""Moment of the picture as a fraction of the episode: the tool has reached the object and is not finished."""
 
 
 def tasks_at_work(request: Request) -> pd.DataFrame:
-    """Return one picture of each task that the results have; if the figure was named, of every known task.
+    """Return one picture of each task in the results; of every task if the figure was named.
 
     Returns:
         Columns task, title, instance (its number), step (of the picture), steps (of the whole episode), return and
@@ -40,7 +40,7 @@ def tasks_at_work(request: Request) -> pd.DataFrame:
         except UserError as error:
             request.log(f"picture of {name} left out: {error}")
     if not rows:
-        raise UserError("no task here has both a script and pictures")
+        raise UserError("none of the tasks has both a script and pictures")
     return pd.DataFrame(rows)
 
 

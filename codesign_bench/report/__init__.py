@@ -1,1 +1,1 @@
-"""One page that tells all of a results folder: figures, numbers, failures, and how everything was made."""
+"""One page on a results folder: figures, numbers, failures, and provenance."""

@@ -1,4 +1,4 @@
-"""The cells of a results folder as the page tells them: how far each is, and why some failed."""
+"""The cells of a results folder for the page: their progress, and why some failed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .tables import NOTHING, Table, listed
 
 @dataclass(frozen=True)
 class PageCell:
-    """One cell: its path below the results folder, its record, and its line as `codesign-bench status` shows it."""
+    """One cell: its path below the results folder, its record, and its line in `codesign-bench status`."""
 
     name: str
     record: CellRecord
@@ -59,10 +59,10 @@ class CellFailure:
 
 
 def read_cells(results: Path) -> tuple[list[PageCell], list[str]]:
-    """Return every cell below `results`, and the names of those whose cell file is damaged or not one of ours.
+    """Return every cell below `results`, and the names of those with a damaged or foreign cell file.
 
     Raises:
-        UserError: there is no such folder, or no cell in it.
+        UserError: the folder does not exist or contains no cells.
     """
     found = list(find_cells(results))
     cells = [
@@ -82,13 +82,13 @@ def variants(cells: Sequence[PageCell]) -> list[str]:
 
 
 def counts(cells: Sequence[PageCell]) -> str:
-    """Return how many cells there are of each status, e.g. "28 done, 2 failed"."""
+    """Return the number of cells per status, e.g. "28 done, 2 failed"."""
     counted = Counter(cell.status for cell in cells)
     return ", ".join(f"{count} {status}" for status, count in sorted(counted.items()))
 
 
 def status_table(cells: Sequence[PageCell]) -> Table:
-    """Return how many cells of each method there are, by status: one row per task and variant."""
+    """Return the number of cells per method and status, one row per task and variant."""
     methods = in_order("methods", (cell.method for cell in cells))
     rows = []
     for task in in_order("tasks", (cell.task for cell in cells)):
@@ -100,7 +100,7 @@ def status_table(cells: Sequence[PageCell]) -> Table:
 
 
 def cell_table(cells: Sequence[PageCell]) -> Table:
-    """Return one row per cell, as `codesign-bench status` shows it, and how long it took."""
+    """Return one row per cell, as in `codesign-bench status`, with its duration."""
     rows = [(*cell.row, _wall_time(cell.record.timings)) for cell in cells]
     header = ("cell", "status", "steps", "of", "return", "success", "time")
     return Table(header, rows, numeric=frozenset(header[2:]))
@@ -116,7 +116,7 @@ def failures(cells: Sequence[PageCell]) -> list[CellFailure]:
 
 
 def facts(results: Path, cells: Sequence[PageCell]) -> list[tuple[str, str]]:
-    """Return what the folder holds, as names and values."""
+    """Return facts about the folder as names and values."""
     seeds = sorted({cell.record.seed for cell in cells})
     return [
         ("results", str(results)),

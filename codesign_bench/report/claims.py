@@ -1,4 +1,4 @@
-"""A study's claims as the page tells them: what results say of each, and by which rule."""
+"""A study's claims for the page: the finding on each, and its rule."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from .tables import NOTHING, Table
 
 @dataclass(frozen=True)
 class ClaimsPart:
-    """What the page tells of claims."""
+    """The part of the page on claims."""
 
     summary: str
     table: Table | None
-    """The claims that there are data for; None where there are none."""
+    """The claims with data; None if there are none."""
     rules: Table | None
     """How these claims were judged."""
     lacking: Table | None
-    """The claims that there are no data for."""
+    """The claims without data."""
     commands: list[str]
-    """What makes the missing data."""
+    """Commands that produce the missing data."""
 
 
 def claims_part(results: Path, study: Study) -> ClaimsPart:
     """Judge the claims of a study on the folder `results`."""
     try:
         return part(judge(study.claims(), load_evidence(results), str(results)))
-    except UserError as error:  # nothing has finished yet, or a table cannot be read
+    except UserError as error:  # no finished cell yet, or an unreadable table
         return ClaimsPart(f"No claim was judged: {error}", None, None, None, [])
 
 
 def part(rows: Sequence[Row]) -> ClaimsPart:
-    """Return judged claims as the page shows them: those with data first, those without below, folded."""
+    """Return judged claims for the page: those with data first, those without below, collapsed."""
     with_data = [row for row in rows if not row.needs]
     without = [row for row in rows if row.asked and row.needs]
     found = [

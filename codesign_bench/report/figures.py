@@ -1,4 +1,4 @@
-"""Figures as parts of the page: pictures, numbers and texts within it, so that it needs no other file."""
+"""Figures as parts of the page, with embedded pictures, numbers and texts, so that it needs no other file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .tables import Table
 
 DOTS_PER_INCH = 220
 SHOWN_PER_INCH = 135
-"""CSS pixels for each inch in a paper: a figure's type of 7 points is then as large as the page's small type."""
+"""CSS pixels per inch of a figure: its font size of 7 points is then that of the page's small text."""
 
 
 @dataclass(frozen=True)
@@ -28,24 +28,24 @@ class FigurePart:
     title: str
     about: str
     picture: str
-    """As a data URI, and its size on the page in CSS pixels."""
+    """The picture as a data URI, and its size on the page in CSS pixels."""
     width: int
     height: int
     numbers: str
     """The figure's CSV file as a data URI."""
     table: Table | None
-    """The figure as a table, where it has one."""
+    """The figure as a table, if it has one."""
     texts: list[tuple[str, str]]
-    """Ending and content of every other text that the figure comes with."""
+    """Ending and content of every other text of the figure."""
 
 
 def figure_parts(results: Path, study: Study, log: Log) -> list[FigurePart]:
-    """Return every figure of a study that the results allow; `log` shows which are left out, and why."""
+    """Return every figure of a study that can be drawn; `log` gets those that are left out, and why."""
     return [_part(drawing) for drawing in possible_drawings(results, log, study)]
 
 
 def data_uri(kind: str, content: bytes) -> str:
-    """Return `content` as an address that holds it."""
+    """Return `content` as a data URI."""
     return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
@@ -69,7 +69,7 @@ def _part(drawing: Drawing) -> FigurePart:
 
 
 def _table(header: list[str], rows: list[list[str]]) -> Table:
-    """Return a table whose columns of numbers are aligned as such."""
+    """Return a table with columns of numbers aligned to the right."""
     columns = zip(*rows, strict=True) if rows else [()] * len(header)
     numeric = {name for name, column in zip(header, columns, strict=True) if column and all(map(is_number, column))}
     return Table(tuple(header), [tuple(row) for row in rows], frozenset(numeric))

@@ -1,4 +1,4 @@
-"""What each method reached at the end of training, and how sure that is: the answer that the page gives first.
+"""Final results of each method with their uncertainty: the first part of the page.
 
 Only finished cells count. Intervals are bootstrap intervals over seeds (`stats.py`).
 """
@@ -30,11 +30,11 @@ from .cells import PageCell, variants
 from .tables import NOTHING, number
 
 SEED = 0
-"""Of the bootstrap; every interval has a stream of its own."""
+"""Seed of the bootstrap; every interval has a separate random stream."""
 SAME_BUDGET = 0.02
-"""Largest part of the steps by which seeds of one budget differ."""
+"""Largest relative difference in steps between seeds with the same budget."""
 STRIP_WIDTH, STRIP_MARGIN = 160.0, 6.0
-"""Of the small pictures of one method's seeds, in the units of their drawing."""
+"""Size of the small pictures of one method's seeds, in drawing units."""
 
 
 @dataclass(frozen=True)
@@ -46,23 +46,23 @@ class Estimate:
     interquartile_mean: float
     low: float
     high: float
-    """Ends of the 95 % bootstrap interval of the mean; NaN for fewer than three seeds."""
+    """The 95 % bootstrap interval of the mean; NaN for fewer than three seeds."""
 
     @property
     def has_interval(self) -> bool:
-        """Whether there are seeds enough for an interval."""
+        """Whether there are enough seeds for an interval."""
         return not np.isnan(self.low)
 
     @property
     def text(self) -> str:
-        """Mean, and interval if there is one."""
+        """Mean, with its interval if there is one."""
         interval = f" [{number(self.low)}, {number(self.high)}]" if self.has_interval else ""
         return number(self.mean) + interval
 
 
 @dataclass(frozen=True)
 class Strip:
-    """Where the marks of one estimate stand on an axis that all methods of a task share, in the drawing's units."""
+    """Positions of the marks of one estimate on an axis shared by all methods of a task, in drawing units."""
 
     dots: list[float]
     mean: float
@@ -73,7 +73,7 @@ class Strip:
 
 @dataclass(frozen=True)
 class MethodResult:
-    """One method's line."""
+    """The results of one method."""
 
     label: str
     seeds: int
@@ -87,7 +87,7 @@ class MethodResult:
 
 @dataclass(frozen=True)
 class TaskResult:
-    """The methods on one task in one variant, and what can be said of the best."""
+    """The methods on one task in one variant, and a verdict on the best."""
 
     task: str
     variant: str
@@ -98,11 +98,11 @@ class TaskResult:
 
 
 def task_results(cells: Sequence[PageCell], curves: pd.DataFrame) -> list[TaskResult]:
-    """Return final return and success of every task, variant and method that has a finished cell.
+    """Return final return and success for every task, variant and method with a finished cell.
 
     Args:
         cells: all cells of the results folder.
-        curves: rows as `codesign_bench.load_results` gives them, of the same folder.
+        curves: rows of `codesign_bench.load_results` for the same folder.
     """
     done = {(cell.task, cell.method, cell.variant, cell.record.seed) for cell in cells if cell.status == DONE}
     rows = zip(*(curves[name] for name in (*CELL_KEYS, "seed")), strict=True)
@@ -126,7 +126,7 @@ def estimate(values: Sequence[float], rng: np.random.Generator) -> Estimate:
 
 
 def strip(shown: Estimate, axis: tuple[float, float]) -> Strip:
-    """Return where the marks of an estimate stand on an axis from `axis[0]` to `axis[1]`."""
+    """Return the positions of the marks of an estimate on an axis from `axis[0]` to `axis[1]`."""
 
     def place(value: float) -> float:
         share = (value - axis[0]) / (axis[1] - axis[0]) if axis[1] > axis[0] else 0.5
@@ -137,19 +137,19 @@ def strip(shown: Estimate, axis: tuple[float, float]) -> Strip:
 
 
 def verdict(estimates: Sequence[tuple[str, Estimate]]) -> str:
-    """Return in a sentence or two which (label, return) is highest, and how sure it is that it is above the next."""
+    """Return one or two sentences: which (label, return) is highest, and whether it is significantly above the next."""
     ranked = sorted(estimates, key=lambda entry: -entry[1].mean)
     if len(ranked) < 2:
-        return "One method alone: nothing to compare it with."
+        return "Only one method: nothing to compare it with."
     (first, best), (second, next_best) = ranked[:2]
     lead = f"Highest final return: {first}, {best.text}; next: {second}, {next_best.text}."
     if not (best.has_interval and next_best.has_interval):
-        return f"{lead} Fewer than {MIN_SEEDS} seeds give no interval: too little to rank them."
+        return f"{lead} With fewer than {MIN_SEEDS} seeds there is no interval, and no ranking."
     low, high = mean_difference_interval(best.values, next_best.values, generator(SEED, f"report {first} {second}"))
     share = probability_of_improvement([(best.values, next_best.values)])
     difference = f"{number(best.mean - next_best.mean)} [{number(low)}, {number(high)}]"
-    told = f"Difference: {difference}; in {share:.0%} of pairs of seeds the first is above."
-    return f"{lead} {told} {'The first is ahead.' if low > 0.0 else 'The interval holds 0: the order may be chance.'}"
+    told = f"Difference: {difference}; the first is higher in {share:.0%} of pairs of seeds."
+    return f"{lead} {told} {'The first is ahead.' if low > 0.0 else 'The interval contains 0: it may be chance.'}"
 
 
 def _task_result(cells: Sequence[PageCell], task: str, variant: str, final: pd.DataFrame) -> TaskResult:
@@ -177,19 +177,19 @@ def _task_result(cells: Sequence[PageCell], task: str, variant: str, final: pd.D
             )
         )
     steps = final.groupby("method")["env_steps"].mean()
-    caution = "" if _agree(steps) else " Methods had different budgets (steps), which this ranking does not consider."
+    caution = "" if _agree(steps) else " Methods had different budgets (steps); the ranking does not account for this."
     return TaskResult(task, variant, axis, methods, verdict(returns) + caution)
 
 
 def _range(values: pd.Series) -> str:
-    """Return the environment steps of all seeds in thousands: their mean, or lowest and highest where budgets differ.
+    """Return the environment steps of all seeds in thousands: their mean, or lowest and highest if budgets differ.
 
-    Seeds of one budget end on whole batches of whole episodes, a few steps apart.
+    Seeds with the same budget end a few steps apart, since batches consist of whole episodes.
     """
     shown = (values.mean(),) if _agree(values) else (values.min(), values.max())
     return NOTHING.join(f"{value / 1e3:,.0f}k" for value in shown)
 
 
 def _agree(env_steps: pd.Series) -> bool:
-    """Return whether environment steps are those of one budget."""
+    """Return whether the environment steps are of the same budget."""
     return bool(env_steps.max() - env_steps.min() <= SAME_BUDGET * env_steps.max())

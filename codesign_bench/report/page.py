@@ -1,6 +1,6 @@
-"""Gather what a results folder holds and write it as one HTML page that needs no other file and no network.
+"""Summarise a results folder in one HTML page that needs no other file and no network.
 
-The page runs no script, and whatever results hold is shown as text: a traceback or a label is never markup.
+The page has no scripts, and all content of results is escaped: a traceback or a label is never markup.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ TEMPLATE = "page.html.j2"
 
 @dataclass(frozen=True)
 class Page:
-    """All that the page tells, in its order."""
+    """The content of the page, in order."""
 
     study: Study
-    """Whose figures and claims it has."""
+    """The study of its figures and claims."""
     facts: list[tuple[str, str]]
     results: list[TaskResult]
     claims: ClaimsPart
@@ -50,7 +50,7 @@ class Page:
     status: Table
     failures: list[CellFailure]
     damaged: list[str]
-    """Cells that could not be read."""
+    """Unreadable cells."""
     cells: Table
     configurations: list[provenance.Configuration]
     versions: Table
@@ -67,16 +67,16 @@ def write_report(results: Path, out: Path, log: Log, study: Study | None = None)
     Args:
         results: a results folder.
         out: an HTML file.
-        log: shows the path.
-        study: whose figures and claims the page has; None: the default one.
+        log: prints the path.
+        study: the study of the page's figures and claims; None: the default one.
 
     Raises:
-        UserError: there is no such folder or no cell in it, or `out` is no file that can be written.
+        UserError: the folder does not exist or has no cells, or `out` is not writable.
     """
     if out.suffix.lower() not in ENDINGS:
-        raise UserError(f"--out {out}: name a file that ends in {ENDINGS[0]}")
+        raise UserError(f"--out {out}: the file must end in {ENDINGS[0]}")
     if out.is_dir():
-        raise UserError(f"--out {out}: is a folder; name a file in it, e.g. {out / 'report.html'}")
+        raise UserError(f"--out {out}: is a folder; give a file in it, e.g. {out / 'report.html'}")
     cells, damaged = read_cells(results)
     make_folder(out.parent)
     page = gather(results, cells, damaged, study or load_study(DEFAULT_STUDY))
@@ -85,7 +85,7 @@ def write_report(results: Path, out: Path, log: Log, study: Study | None = None)
 
 
 def gather(results: Path, cells: Sequence[PageCell], damaged: list[str], study: Study) -> Page:
-    """Return all that the page tells of the folder `results` and its cells, as `read_cells` returned them."""
+    """Return the content of the page on the folder `results` and its cells from `read_cells`."""
     left_out: list[str] = []
     return Page(
         study=study,
@@ -122,16 +122,16 @@ def render(page: Page) -> str:
 
 
 def code_spans(text: str) -> Markup:
-    """Return `text` as HTML in which what stands between backticks is set as code."""
+    """Return `text` as HTML, with text between backticks as code."""
     parts = text.split("`")
-    if len(parts) % 2 == 0:  # one backtick without its partner
+    if len(parts) % 2 == 0:  # an unpaired backtick
         return escape(text)
     spans = (Markup("<code>{}</code>").format(part) if index % 2 else escape(part) for index, part in enumerate(parts))
     return Markup("").join(spans)
 
 
 def _curves(results: Path) -> pd.DataFrame:
-    """Return the curves of all cells; none where no cell was evaluated yet."""
+    """Return the curves of all cells; empty if no cell has been evaluated."""
     try:
         return load_results(results)
     except UserError:

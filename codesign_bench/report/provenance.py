@@ -1,4 +1,4 @@
-"""How the results were made: configurations with their sources, versions, machines, times, and the code's commit."""
+"""Provenance of the results: configurations with sources, versions, machines, times, and the code's commit."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Configuration:
 
 
 def configurations(cells: Sequence[PageCell]) -> list[Configuration]:
-    """Return every method's configuration: one row per setting, or one for each of its values where cells differ."""
+    """Return every method's configuration: one row per setting, or one per value if cells differ."""
     found = []
     for method in in_order("methods", (cell.method for cell in cells)):
         group = [cell for cell in cells if cell.method == method]
@@ -42,7 +42,7 @@ def configurations(cells: Sequence[PageCell]) -> list[Configuration]:
 
 
 def version_table(cells: Sequence[PageCell]) -> Table:
-    """Return the version of every package that cells record, with the cells where they differ."""
+    """Return the version of every package that cells record, with the cells if versions differ."""
     packages = dict.fromkeys(name for cell in cells for name in cell.record.versions)
     rows = []
     for name in packages:
@@ -55,7 +55,7 @@ def version_table(cells: Sequence[PageCell]) -> Table:
 
 
 def machine_table(cells: Sequence[PageCell]) -> Table:
-    """Return the machines that cells ran on."""
+    """Return the machines of the cells."""
     names = ("name", "system", "cpu", "cores")
     rows = []
     for facts, group in _grouped(cells, lambda cell: tuple(str(cell.record.host.get(name)) for name in names)):
@@ -66,7 +66,7 @@ def machine_table(cells: Sequence[PageCell]) -> Table:
 
 
 def time_table(cells: Sequence[PageCell]) -> Table:
-    """Return per task and method how long finished cells took, in the median, and in all."""
+    """Return, per task and method, the median and total time of finished cells."""
     rows = []
     for task in in_order("tasks", (cell.task for cell in cells)):
         for method in in_order("methods", (cell.method for cell in cells if cell.task == task)):
@@ -77,12 +77,12 @@ def time_table(cells: Sequence[PageCell]) -> Table:
             rows.append(
                 (task, method, str(len(walls)), training, evaluation, duration(sum(walls)) if walls else NOTHING)
             )
-    header = ("task", "method", "cells", "training, median", "evaluation, median", "in all")
+    header = ("task", "method", "cells", "training, median", "evaluation, median", "total")
     return Table(header, rows, numeric=frozenset(header[2:]))
 
 
 def period(cells: Sequence[PageCell]) -> str:
-    """Return when the first cell started and the last one ended."""
+    """Return the time from the first cell's start to the last one's end."""
     started = [cell.record.timings.started or "" for cell in cells]
     ended = [cell.record.timings.ended or "" for cell in cells]
     first, last = min(filter(None, started), default=NOTHING), max(filter(None, ended), default="not ended yet")
@@ -90,7 +90,7 @@ def period(cells: Sequence[PageCell]) -> str:
 
 
 def code_version(folder: Path | None = None) -> str:
-    """Return the version of this code, and its commit where `folder` (default: its own) is a git checkout of it."""
+    """Return the version of this code, and its commit if `folder` (default: the package's) is a git checkout of it."""
     version = f"codesign-bench {codesign_bench.__version__}"
     folder = folder or Path(codesign_bench.__file__).parent
     try:
@@ -99,12 +99,12 @@ def code_version(folder: Path | None = None) -> str:
         changed = _git(folder, "status", "--porcelain", "--untracked-files=no")
     except (OSError, subprocess.SubprocessError):
         return version
-    return f"{version}, commit {commit[:12]}{', with changes that are not committed' if changed else ''}"
+    return f"{version}, commit {commit[:12]}{', with uncommitted changes' if changed else ''}"
 
 
 def where(group: Sequence[PageCell], everything: Sequence[PageCell]) -> str:
-    """Return in few words which of the cells `everything` those of `group` are: by task, variant or method if one
-    of these tells them apart from the others, else by name."""
+    """Describe briefly which of the cells `everything` are in `group`: by task, variant or method if one of these
+    distinguishes them from the others, else by name."""
     chosen = {cell.name for cell in group}
     others = [cell for cell in everything if cell.name not in chosen]
     if not others:
@@ -121,7 +121,7 @@ def where(group: Sequence[PageCell], everything: Sequence[PageCell]) -> str:
 
 
 def _setting_rows(cells: Sequence[PageCell], part: str) -> Iterable[tuple[str, ...]]:
-    """Yield setting, value, source and cells; a setting is missing from cells that are older than it."""
+    """Yield setting, value, source and cells; cells older than a setting do not have it."""
     settings = dict.fromkeys(name for cell in cells for name in cell.record.config.parts[part])
     for name in settings:
         having = [cell for cell in cells if name in cell.record.config.parts[part]]
@@ -135,7 +135,7 @@ def _setting_rows(cells: Sequence[PageCell], part: str) -> Iterable[tuple[str, .
 
 
 def _grouped(cells: Sequence[PageCell], key: Callable[[PageCell], Any]) -> list[tuple[Any, list[PageCell]]]:
-    """Return the cells by what `key` gives, in the order in which that first occurs."""
+    """Return the cells grouped by `key`, in order of first occurrence."""
     groups: dict[Any, list[PageCell]] = {}
     for cell in cells:
         groups.setdefault(key(cell), []).append(cell)
@@ -152,7 +152,7 @@ def _median(seconds: Iterable[float | None]) -> str:
 
 
 def _moment(text: str) -> str:
-    """Return a time as cell files hold it, to the minute; the files' times are UTC."""
+    """Return a time of a cell file, which is UTC, to the minute."""
     return f"{text[:10]} {text[11:16]} UTC" if text[10:11] == "T" else text
 
 

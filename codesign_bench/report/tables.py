@@ -1,4 +1,4 @@
-"""A table as the page shows it: text alone, laid out by the template."""
+"""Tables of the page: only text; the template does the layout."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 NOTHING = "\N{EN DASH}"
-"""What stands where there is no value."""
+"""Shown instead of a missing value."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Table:
 
 
 def number(value: float) -> str:
-    """Return a number with two decimals and a true minus, or a dash for NaN."""
+    """Return a number with two decimals and a minus sign, or a dash for NaN."""
     return NOTHING if value != value else f"{value:.2f}".replace("-", "\N{MINUS SIGN}")
 
 

@@ -1,4 +1,4 @@
-"""Statistics over seeds: arrays or frames in, numbers or frames out; nothing here reads files or draws."""
+"""Statistics over seeds: arrays or frames in, numbers or frames out, without files or figures."""
 
 from codesign_bench.stats.bootstrap import (
     CONFIDENCE,

@@ -1,4 +1,4 @@
-"""Learning curves of several seeds: their final values, and statistics along the environment steps; frames in and out.
+"""Learning curves of several seeds: final values, and statistics along environment steps; frames in, frames out.
 
 Shapes: `N` seeds.
 """
@@ -13,16 +13,16 @@ from codesign_bench.stats.bootstrap import bootstrap, interquartile_means
 from codesign_bench.stats.summaries import mean, standard_error
 
 CELL_KEYS = ["task", "method", "variant"]
-"""Columns that identify what is compared; the rows of one such group and one seed are one curve."""
+"""Columns that identify a group of curves; the rows of one group and one seed are one curve."""
 
 
 def final_values(frame: pd.DataFrame, column: str, *, last: int = 1) -> pd.DataFrame:
     """Return each curve's final value of `column`: the mean over its last `last` evaluations.
 
     Args:
-        frame: rows as `codesign_bench.load_results` gives them.
+        frame: rows of `codesign_bench.load_results`.
         column: e.g. "return_mean".
-        last: evaluations to average; more of them damp the noise of a single one.
+        last: number of evaluations to average; more of them reduce noise.
 
     Returns:
         One row per curve: task, method, variant, seed, env_steps (of the last evaluation), and `column`.
@@ -35,12 +35,12 @@ def final_values(frame: pd.DataFrame, column: str, *, last: int = 1) -> pd.DataF
 def on_common_grid(frame: pd.DataFrame, column: str) -> pd.DataFrame:
     """Put the curves of all seeds of each task, method and variant on the same environment steps.
 
-    The grid of a group is every step count at which any of its seeds was evaluated. Between two evaluations of a seed
-    the value is interpolated; outside of them the seed does not count, so that a curve which ended early is never
-    drawn on, and the number of seeds falls along the axis of a partial sweep.
+    The grid of a group has every step count at which one of its seeds was evaluated. Values are interpolated between
+    two evaluations of a seed. Outside of its evaluations a seed is left out: a curve that ended early is not
+    extrapolated, and the number of seeds decreases along a partial sweep.
 
     Args:
-        frame: rows as `codesign_bench.load_results` gives them.
+        frame: rows of `codesign_bench.load_results`.
         column: e.g. "return_mean".
 
     Returns:
@@ -53,7 +53,7 @@ def on_common_grid(frame: pd.DataFrame, column: str) -> pd.DataFrame:
 
 
 def _group_on_grid(group: pd.DataFrame, column: str) -> pd.DataFrame:
-    """Return one group's curves on the union of their environment steps."""
+    """Return a group's curves on the union of their environment steps."""
     grid = np.unique(group["env_steps"].to_numpy(dtype=np.float64))
     parts = []
     for seed, curve in group.groupby("seed"):
@@ -78,13 +78,15 @@ def curve_statistics(frame: pd.DataFrame, column: str) -> pd.DataFrame:
 def curve_intervals(frame: pd.DataFrame, column: str, rng: np.random.Generator) -> pd.DataFrame:
     """Return interquartile mean, its bootstrap interval and number of seeds of `column`, along the environment steps.
 
-    Whole curves are resampled, so that a resample means the same seeds at every step that the same seeds reached.
+    Whole curves are resampled: a resample has the same seeds at all steps that the same seeds reached.
 
     Returns:
         Columns task, method, variant, env_steps, interquartile_mean, low, high (NaN below three seeds), seeds.
     """
     parts = []
     for keys, group in on_common_grid(frame, column).groupby(CELL_KEYS):
+        # Seeds may end at different steps. Stretches with the same set of seeds are resampled as whole curves: drawing
+        # seeds anew at every step would make the interval jump between neighbouring steps.
         curves = group.pivot(index="env_steps", columns="seed", values=column)
         for reached, stretch in curves.groupby([curves[seed].notna() for seed in curves]):
             values = stretch.to_numpy()[:, np.array(reached)].T

@@ -1,6 +1,6 @@
-"""How probably one method is above another, and performance profiles, over several tasks that weigh alike.
+"""Probability of improvement and performance profiles over several tasks with equal weights.
 
-Shapes: `N` and `M` seeds, `R` resamples, `T` thresholds. Both are those of Agarwal et al. (2021, "Deep Reinforcement
+Shapes: `N` and `M` seeds, `R` resamples, `T` thresholds. Both follow Agarwal et al. (2021, "Deep Reinforcement
 Learning at the Edge of the Statistical Precipice"); seeds are resampled within each task. A test compares them with
 that work's library, rliable.
 """
@@ -17,13 +17,13 @@ from codesign_bench.stats.bootstrap import CONFIDENCE, RESAMPLES, bootstrap, int
 from codesign_bench.stats.summaries import finite
 
 Pairs = Sequence[tuple[ArrayLike, ArrayLike]]
-"""Per task, the scores of two methods, (N,) and (M,)."""
+"""For each task, the scores of two methods, (N,) and (M,)."""
 
 
 def probability_of_improvement(pairs: Pairs) -> float:
-    """Return how probably a seed of the first method is above one of the second, averaged over tasks.
+    """Return the probability that a seed of the first method scores higher than one of the second, averaged over tasks.
 
-    Equal scores count one half; NaN where a method has no score on some task.
+    Equal scores count one half; NaN if a method has no score on a task.
     """
     samples = [(finite(first), finite(second)) for first, second in pairs]
     if not samples or not all(first.size and second.size for first, second in samples):
@@ -36,7 +36,7 @@ def probability_of_improvement_interval(
 ) -> tuple[float, float]:
     """Return a percentile bootstrap interval of `probability_of_improvement`, seeds resampled within each task.
 
-    Where each score of one method is above each of the other's, it is 1 to 1 (or 0 to 0): no resample can differ.
+    If all scores of one method are above all of the other's, it is 1 to 1 (or 0 to 0), since no resample can differ.
     """
     samples = [sample for pair in pairs for sample in pair]
 
@@ -48,16 +48,18 @@ def probability_of_improvement_interval(
 
 
 def _share_above(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return, along the last axis, the share of pairs in which the first is above, ties counting one half."""
+    """Return, along the last axis, the fraction of pairs in which the first is higher; ties count one half."""
+    # Mann-Whitney's U is the number of pairs that the first wins, with ties as halves. Only the statistic is used; the
+    # asymptotic method avoids the cost of an exact p-value.
     statistic = mannwhitneyu(first, second, axis=-1, method="asymptotic").statistic
     return np.asarray(statistic / (first.shape[-1] * second.shape[-1]))
 
 
 def performance_profile(scores: Sequence[ArrayLike], thresholds: ArrayLike) -> np.ndarray:
-    """Return (T,): the share of seeds above each threshold, averaged over tasks.
+    """Return (T,): the fraction of seeds above each threshold, averaged over tasks.
 
     Args:
-        scores: (N,) per task, on a scale that tasks share.
+        scores: (N,) per task, on a common scale.
         thresholds: (T,)
     """
     levels = np.asarray(thresholds, dtype=np.float64)
@@ -75,7 +77,7 @@ def performance_profile_interval(
     confidence: float = CONFIDENCE,
     resamples: int = RESAMPLES,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return a percentile bootstrap interval, (T,) and (T,), at each threshold of `performance_profile` by itself."""
+    """Return a pointwise percentile bootstrap interval, (T,) and (T,), of `performance_profile`."""
     levels = np.asarray(thresholds, dtype=np.float64)
 
     def profile(*resampled: np.ndarray) -> np.ndarray:

@@ -1,1 +1,1 @@
-"""One file or folder, one study."""
+"""One file or folder per study."""

@@ -1,6 +1,6 @@
-"""What a study is; everything that a new study needs is imported from here.
+"""The interface of a study; a new study imports everything it needs from here.
 
-`experiment.py` is what one figure needs, `study.py` the study itself.
+`experiment.py` defines experiments, `study.py` the study itself.
 """
 
 from codesign_bench.study.experiment import Experiment, Grid, Measure, stages_of

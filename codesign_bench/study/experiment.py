@@ -1,4 +1,4 @@
-"""What one figure or table needs: cells, in stages, and what is measured with finished policies."""
+"""Experiments: the cells of one figure or table, in stages, and measurements with finished policies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from codesign_bench.config.profiles import profile_named
 from codesign_bench.console import Log
 
 Measure = Callable[[Path, str, Log], object]
-"""Makes what no cell holds, unless it is there: results folder, name of the profile, what shows the user a line."""
+"""Measures what cells do not have, if missing; arguments: results folder, name of the profile, logger."""
 
 
 @dataclass(frozen=True)
@@ -23,13 +23,13 @@ class Grid:
     tasks: tuple[str, ...]
     methods: tuple[str, ...]
     seeds: tuple[int, ...] | Mapping[str, tuple[int, ...]]
-    """Seeds of every cell, or those of each task by its name."""
+    """Seeds for all tasks, or by task."""
     variants: tuple[Variant, ...] = (DEFAULT,)
     overrides: tuple[str, ...] = ()
-    """Settings other than the profile's, in the form of `--set`."""
+    """Settings that override the profile's, in the form of `--set`."""
 
     def cells(self, profile: str, count: int | None = None) -> list[Cell]:
-        """Return the cells under a profile; `count` overrides how many seeds there are."""
+        """Return the cells under a profile; `count` overrides the number of seeds."""
         return [
             cell
             for task in self.tasks
@@ -45,29 +45,29 @@ class Grid:
 
     def _seeds_of(self, task: str, profile: str, count: int | None) -> tuple[int, ...]:
         seeds = self.seeds[task] if isinstance(self.seeds, Mapping) else self.seeds
-        if count is not None:  # more seeds than the study has follow its last one
+        if count is not None:  # additional seeds follow the study's last one
             return (*seeds, *range(seeds[-1] + 1, seeds[-1] + 1 + count))[:count]
         return seeds[: profile_named(profile).most_seeds]
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """What one figure or table needs. One that needs no cells is drawn from the code itself, or from measurements."""
+    """The needs of one figure or table. Without cells, it is drawn from the code itself or from measurements."""
 
     figures: tuple[str, ...]
-    """Names of figures that show it."""
+    """Names of the figures that show it."""
     source: str
-    """Where it comes from: a section, a figure or a table of a paper, or "ours"."""
+    """Source: a section, figure or table of a paper, or "ours"."""
     stages: tuple[tuple[Grid, ...], ...] = ()
-    """Grids to run, one stage after the other; cells of a later stage may start from policies of an earlier one."""
+    """Grids to run, stage by stage; cells of a later stage may start from policies of an earlier one."""
     measures: tuple[Measure, ...] = ()
-    """What is measured after the cells have run."""
+    """Measurements after the cells have run."""
     plays: bool = False
-    """Whether its claims are judged by playing finished policies and scripts, too."""
+    """Whether its claims also need measurements with finished policies or scripts."""
 
 
 def stages_of(experiments: Sequence[Experiment], profile: str, seeds: int | None = None) -> list[list[Cell]]:
-    """Return the cells of several experiments, each once, stage by stage."""
+    """Return the cells of several experiments, without duplicates, stage by stage."""
     stages: list[list[Cell]] = []
     for index in range(max((len(experiment.stages) for experiment in experiments), default=0)):
         before = {cell for stage in stages for cell in stage}

@@ -1,4 +1,4 @@
-"""A study: all that a question needs, as data. The benchmark itself knows no study but the default one's name.
+"""A study: experiments, figures and claims for one question, as data. The core knows only the default study's name.
 
 A new study is one file in `codesign_bench/studies/`, or a module of another package, that defines `STUDY`.
 """
@@ -15,48 +15,48 @@ from codesign_bench.errors import unknown_name
 from codesign_bench.registry import load_attribute, names
 from codesign_bench.study.experiment import Experiment
 
-if TYPE_CHECKING:  # claims need pandas and scipy, which listing a study does not
+if TYPE_CHECKING:  # claims need pandas and scipy; listing studies does not
     from codesign_bench.claims.claim import Claim
 
 DEFAULT_STUDY = "corl2023"
-"""The study of `reproduce`, `verify`, `report` and `plot` without `--study`, whose methods `--method all` means."""
+"""The default of `--study`; `--method all` selects its methods."""
 ALL = "all"
 
 
 def no_claims() -> Sequence[Claim]:
-    """Return no claim."""
+    """Return no claims."""
     return ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """Experiments, figures and claims that belong together, and what of a profile they set."""
+    """Experiments, figures and claims for one question, with profiles and axes for them."""
 
     name: str
-    """Its file's name."""
+    """The study's name, which is also the name of its file."""
     title: str
     question: str
-    """What it asks, in a sentence or two."""
+    """The question, in one or two sentences."""
     source: str = "ours"
     """A publication, or "ours"."""
     methods: tuple[str, ...] = ()
-    """The methods that it compares, in the order of its tables."""
+    """The methods compared, in the order of its tables."""
     experiments: Mapping[str, Experiment] = field(default_factory=dict)
     """By name, cheap ones first."""
     claims: Callable[[], Sequence[Claim]] = no_claims
-    """Makes its claims when they are asked for."""
+    """Returns its claims; called only when they are needed."""
     profiles: tuple[Profile, ...] = ()
-    """Profiles that it adds."""
+    """Additional profiles."""
     axes: tuple[Axis, ...] = ()
-    """Axes that its cells vary beyond the built-in ones."""
+    """Additional axes of its cells."""
 
     @property
     def figures(self) -> tuple[str, ...]:
-        """Names of all figures of its experiments, each once."""
+        """Names of all figures of its experiments, without duplicates."""
         return tuple(dict.fromkeys(name for experiment in self.experiments.values() for name in experiment.figures))
 
     def experiments_named(self, wanted: Sequence[str]) -> dict[str, Experiment]:
-        """Return the experiments that names mean: their own or those of figures; none or `all` means every one.
+        """Return experiments by their names or their figures' names; no names or `all` selects all.
 
         Raises:
             UserError: an unknown name.
@@ -80,8 +80,8 @@ def load_study(name: str) -> Study:
     """Return the study `name`.
 
     Raises:
-        UserError: there is no such study.
-        TypeError: its module's `STUDY` is something else.
+        UserError: an unknown study.
+        TypeError: its module's `STUDY` is not a `Study`.
     """
     study = load_attribute("studies", name, "STUDY")
     if not isinstance(study, Study):

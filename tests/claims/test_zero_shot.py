@@ -55,7 +55,7 @@ def test_unseen_instances_are_close_if_they_keep_nine_tenths(
 
 
 def test_a_policy_that_learned_nothing_is_nothing_to_compare_with() -> None:
-    with pytest.raises(InsufficientData, match="nothing was learned"):
+    with pytest.raises(InsufficientData, match="no learned behaviour"):
         found(CLOSE, cutouts({0.1: (1.0, 1.0, 1.0)}, seen=-0.1))
 
 

@@ -65,5 +65,5 @@ def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert main(order) == 0
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     assert main(order) == 2
-    assert "is there already; choose another folder" in capsys.readouterr().err
+    assert "already exists; choose another folder" in capsys.readouterr().err
     assert before == {path: path.read_bytes() for path in tmp_path.iterdir()}

@@ -10,7 +10,7 @@ from codesign_bench.cli import main
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--task", "push", "--out", "push.jpg"], "pictures end in .gif or .png"),
+        (["--task", "push", "--out", "push.jpg"], "the file must end in .gif or .png"),
         (["--task", "pusch", "--out", "push.png"], "unknown task 'pusch'; choose from: push"),
         (["--out", "push.png"], "give --policy or --task"),
         (["--policy", "x", "--behaviour", "random", "--out", "push.png"], "either --policy or --behaviour"),

@@ -51,6 +51,6 @@ def test_other_bad_input_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtur
         assert str(results) in capsys.readouterr().err
     make_results(tmp_path / "runs")
     assert main(["verify", "--results", str(tmp_path / "runs"), "--out", str(tmp_path / "file" / "claims")]) == 2
-    assert "cannot write" in capsys.readouterr().err
+    assert "not writable" in capsys.readouterr().err
     with pytest.raises(UserError, match="nowhere"):
         load_evidence(tmp_path / "nowhere")

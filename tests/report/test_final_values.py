@@ -67,20 +67,20 @@ def test_a_strip_without_width_puts_its_dots_in_the_middle() -> None:
         (
             {"A": [1.0, 1.0, 1.0], "B": [5.0, 5.0, 5.0], "C": [0.0, 0.0, 0.0]},
             "Highest final return: B, 5.00 [5.00, 5.00]; next: A, 1.00 [1.00, 1.00]. "
-            "Difference: 4.00 [4.00, 4.00]; in 100% of pairs of seeds the first is above. The first is ahead.",
+            "Difference: 4.00 [4.00, 4.00]; the first is higher in 100% of pairs of seeds. The first is ahead.",
         ),
         (
             {"A": [0.0, 6.0, 9.0], "B": [4.0, 4.0, 4.0]},
             "Highest final return: A, 5.00 [0.00, 9.00]; next: B, 4.00 [4.00, 4.00]. "
-            "Difference: 1.00 [\N{MINUS SIGN}4.00, 5.00]; in 67% of pairs of seeds the first is above. "
-            "The interval holds 0: the order may be chance.",
+            "Difference: 1.00 [\N{MINUS SIGN}4.00, 5.00]; the first is higher in 67% of pairs of seeds. "
+            "The interval contains 0: it may be chance.",
         ),
         (
             {"A": [5.0, 5.0], "B": [1.0, 1.0, 1.0]},
             "Highest final return: A, 5.00; next: B, 1.00 [1.00, 1.00]. "
-            "Fewer than 3 seeds give no interval: too little to rank them.",
+            "With fewer than 3 seeds there is no interval, and no ranking.",
         ),
-        ({"A": [5.0, 6.0, 7.0]}, "One method alone: nothing to compare it with."),
+        ({"A": [5.0, 6.0, 7.0]}, "Only one method: nothing to compare it with."),
     ],
 )
 def test_the_verdict_says_how_sure_the_order_is(values: dict[str, list[float]], expected: str) -> None:

@@ -66,5 +66,5 @@ def test_numbers_of_numpy_become_plain_ones_and_floats_survive(tmp_path: Path) -
 
 
 def test_what_is_no_json_value_is_named(tmp_path: Path) -> None:
-    with pytest.raises(TypeError, match="PosixPath is no JSON value"):
+    with pytest.raises(TypeError, match="PosixPath is not a JSON value"):
         dump_json({"folder": tmp_path})

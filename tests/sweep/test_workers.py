@@ -66,7 +66,9 @@ def test_a_cell_of_another_configuration_is_refused_with_the_difference(tmp_path
     path = toy_cell().folder(tmp_path) / "cell.json"
     path.write_text(path.read_text().replace('"done"', '"running"'))
     other = toy_cell("episodes=5")
-    assert run(other, tmp_path) == Outcome(other, "failed", "another configuration: episodes: stored 4, requested 5")
+    assert run(other, tmp_path) == Outcome(
+        other, "failed", "the stored configuration differs: episodes: stored 4, requested 5"
+    )
 
 
 def test_a_killed_process_is_recorded_as_a_failure(tmp_path: Path) -> None:
@@ -101,8 +103,9 @@ def test_how_a_process_ended_is_said_in_words(code: int, told: str) -> None:
 
 
 def test_a_worker_passes_over_ctrl_c_and_the_main_process_does_not() -> None:
+    before = signal.getsignal(signal.SIGINT)
     prepare_worker(os.getpid())
-    assert signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+    assert signal.getsignal(signal.SIGINT) is before
     line = (
         "import os, signal; from codesign_bench.sweep.workers import prepare_worker; "
         "prepare_worker(os.getppid()); os.kill(os.getpid(), signal.SIGINT); print('still here')"

@@ -1,6 +1,6 @@
 """The study of the paper: "Learning to Design and Use Tools for Robotic Manipulation" (Liu et al., CoRL 2023).
 
-`scenes.py`, `learners.py`, `protocol.py` and `real_robot.py` hold every number that the paper prints, `members.py` the
+`scenes.py`, `learners.py`, `protocol.py` and `real_robot.py` have every number that the paper prints, `members.py` the
 names of its tasks and methods, `profile.py` its hyperparameters as a profile, `experiments.py` the cells that its
 figures need, `claims.py` its findings, `baseline_sweep.py` and `hyperparameters.py` what two tables are drawn from.
 """
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def claims() -> Sequence[Claim]:
     """Return the paper's claims, in the order of its sections."""
-    from codesign_bench.studies.corl2023.claims import CLAIMS  # needs pandas and scipy, which listing does not
+    from codesign_bench.studies.corl2023.claims import CLAIMS  # needs pandas and scipy; listing does not
 
     return CLAIMS
 

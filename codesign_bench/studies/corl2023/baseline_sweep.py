@@ -1,7 +1,8 @@
 """The paper's grid of CMA-ES settings, searched on a budget by successive halving (Jamieson & Talwalkar 2016).
 
-The grid has 972 settings. A random part of it, the paper's best among them, starts; after every rung the better third
-goes on with three times the budget. Settings are judged by the return of CMA-ES's mean on the evaluation instances.
+The grid has 972 settings. The first rung has a random subset that includes the paper's best; after every rung the best
+third continues with three times the budget. The score of a setting is the return of CMA-ES's mean on the evaluation
+instances.
 """
 
 from __future__ import annotations
@@ -33,9 +34,9 @@ if TYPE_CHECKING:
 FOLDER = "baseline_sweep"
 TASK, METHOD = "push", "cma_es"
 SEED = 0
-"""Of the random part of the grid, and of every run."""
+"""Seed of the random subset of the grid, and of every run."""
 REDUCTION = 3
-"""A rung keeps one setting in three and triples their budget."""
+"""A rung keeps a third of the settings and triples their budget."""
 
 KEYS: dict[str, Swept] = {
     "popsize": CMA_ES_SWEEP.population_size,
@@ -45,16 +46,16 @@ KEYS: dict[str, Swept] = {
     "rank_mu_learning_rate": CMA_ES_SWEEP.rank_mu_learning_rate,
     "rank_one_learning_rate": CMA_ES_SWEEP.rank_one_learning_rate,
 }
-"""Hyperparameter of the method -> what the paper tested."""
+"""Hyperparameter of the method -> values tested in the paper."""
 COLUMNS = ("task", "rung", "budget", *KEYS, "paper_best", "env_steps", "return_mean", "kept")
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How much a profile spends."""
+    """Size of the sweep under a profile."""
 
     settings: int
-    """That start."""
+    """Number of settings of the first rung."""
     budget: int
     """Environment steps of the first rung."""
 
@@ -72,10 +73,10 @@ def settings_of(count: int) -> list[dict[str, float]]:
 
 
 def sweep_baseline(results: Path, profile: str, log: Log) -> pd.DataFrame:
-    """Search, unless `results` holds the table already; return the table, one row per setting and rung.
+    """Run the sweep unless `results` already has its table; return the table, one row per setting and rung.
 
     Raises:
-        UserError: the folder cannot be written.
+        UserError: the folder is not writable.
     """
     import pandas as pd
 
@@ -111,7 +112,7 @@ def sweep_baseline(results: Path, profile: str, log: Log) -> pd.DataFrame:
 
 
 def load_sweep(request: Request) -> pd.DataFrame:
-    """Return the table of the most thorough sweep below the results folder.
+    """Return the table of the largest sweep below the results folder.
 
     Raises:
         UserError: there is none.

@@ -45,7 +45,7 @@ FROM_SCRATCH = (*FINE_TUNED, run_command(OURS, FETCH, FEW_SEEDS, _listed("scratc
 
 
 def _against(baseline: str, final: str, faster: str) -> Iterator[Claim]:
-    """Yield the claims that compare the paper's method with one other, per task and across tasks."""
+    """Yield the claims that compare the paper's method with another method, per task and across tasks."""
     yield Claim(
         f"final_return.all_tasks.{baseline}",
         f"across all tasks, {final} {baseline}",

@@ -1,4 +1,4 @@
-"""The paper's experiments as data: which cells each of them needs, in which order. Seeds are as many as the paper's."""
+"""The paper's experiments as data: the cells of each, in order, with the paper's numbers of seeds."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ ON_AN_ARM = tuple(REAL_ROBOT.own_successes)
 
 
 def sweep_the_baseline(results: Path, profile: str, log: Log) -> None:
-    """Search the settings of the CMA-ES baseline, unless `results` holds the table already."""
+    """Sweep the settings of the CMA-ES baseline unless `results` already has the table."""
     from codesign_bench.studies.corl2023.baseline_sweep import sweep_baseline  # needs joblib and a method
 
     sweep_baseline(results, profile, log)
 
 
 def deploy(results: Path, profile: str, log: Log) -> None:
-    """Play the paper's trials of our method's first seed on the arm, unless `results` holds them already.
+    """Play the paper's trials of our method's first seed on the arm unless `results` already has them.
 
     Raises:
         UserError: a seed's cell is not done.

@@ -1,4 +1,4 @@
-"""Every hyperparameter of every method on the paper's tasks, as configurations resolve them, profile beside profile."""
+"""Every resolved hyperparameter of every method on the paper's tasks, for several profiles."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 PROFILES = ("paper", "laptop")
 SCENE = "scene"
-"""In place of a method: what the paper's tables say about the scene, which no profile changes."""
+"""Used instead of a method for the scene's rows of the paper's tables, which no profile changes."""
 SCENE_SOURCE = "paper, table of {task}"
 SCIENTIFIC_BELOW = 1e-3
-"""Smaller numbers are written as 2e-5, like the paper's."""
+"""Smaller numbers are written as 2e-5, as in the paper."""
 
 
 def hyperparameters(methods: Iterable[str], tasks: Iterable[str] = tuple(SCENES)) -> pd.DataFrame:
@@ -48,10 +48,10 @@ def hyperparameters(methods: Iterable[str], tasks: Iterable[str] = tuple(SCENES)
 
 
 def hyperparameters_of_results(request: Request) -> pd.DataFrame:
-    """Return the settings of the paper's methods on those of its tasks that results have; if named, on all of them.
+    """Return the settings of the paper's methods on its tasks in the results; on all its tasks if the figure was named.
 
     Raises:
-        UserError: the results hold none of the paper's tasks.
+        UserError: the results have none of the paper's tasks.
     """
     present = TASKS if request.named else tasks_in(request.results)
     return hyperparameters(METHODS, [task for task in TASKS if task in present])

@@ -22,7 +22,7 @@ class LearnerTable:
     design_log_std: float
     """Initial logarithm of the design action's standard deviation."""
     fix_std: bool
-    """Whether both standard deviations stay as they start."""
+    """Whether both standard deviations are fixed."""
     policy_learning_rate: float
     """Adam's step size for both policies."""
     entropy_weight: float

@@ -1,4 +1,4 @@
-"""The profile `paper`: the appendix's tables of hyperparameters digit for digit, and 10 million steps.
+"""The profile `paper`: exactly the hyperparameters in the appendix's tables, and 10 million steps.
 
 The paper uses the same optimiser settings for its own method, the shared architecture and HWasP-minimal. A task that
 the paper does not have gets the settings of its push.
@@ -72,7 +72,7 @@ def perceptrons(table: MlpBaselineTable, task_name: str) -> Settings:
 
 
 def evolution(task_name: str) -> Settings:
-    """Return the settings of CMA-ES that came out best in the paper's sweep, on every task."""
+    """Return the best settings of CMA-ES in the paper's sweep, the same for every task."""
     del task_name
     best = {
         "popsize": int(CMA_ES_SWEEP.population_size.best),
@@ -92,11 +92,11 @@ PARTS: Mapping[str, tuple[Callable[[str], Settings], ...]] = {
     "hwasp_minimal": (optimizer, graph_networks),
     "cma_es": (evolution,),
 }
-"""Of each method's settings; later parts win."""
+"""Parts of each method's settings; later parts override."""
 
 
 def hyperparameters(method_name: str, task_name: str) -> Settings:
-    """Return what the paper sets for a method on a task; nothing for methods that it does not have."""
+    """Return the paper's settings for a method on a task; none for methods that are not in the paper."""
     return {name: entry for part in PARTS.get(method_name, ()) for name, entry in part(task_name).items()}
 
 

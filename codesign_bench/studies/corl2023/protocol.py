@@ -1,4 +1,4 @@
-"""How the paper's experiments were run, and the times that they took."""
+"""Protocol and running times of the paper's experiments."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Timing:
     training_minutes: float
     """Wall clock for 10^7 environment steps."""
     inference_seconds: float | None
-    """One forward pass; None where there is no model."""
+    """One forward pass; None if there is no model."""
 
 
 @dataclass(frozen=True)
@@ -27,10 +27,10 @@ class Patch:
 
 @dataclass(frozen=True, kw_only=True)
 class Protocol:
-    """How the paper's experiments were run (captions and appendix "Experimental Details")."""
+    """Protocol of the paper's experiments (captions and appendix "Experimental Details")."""
 
     total_steps: int
-    """Environment steps of one training run; the paper says so of its timing table."""
+    """Environment steps of one training run, from the paper's timing table."""
     seeds: int
     """Seeds per method and task in the learning curves."""
     seeds_scoop_3d: int

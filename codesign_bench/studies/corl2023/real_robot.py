@@ -11,15 +11,15 @@ from codesign_bench.studies.corl2023.ranges import Interval, Triple
 class RealRobot:
     """The paper's evaluation on a real Franka Panda (section "Evaluation on a real robot" and its appendix).
 
-    Fetch cube's places are in the robot's frame as printed: m, the base at the origin, y negative where the cubes lie.
+    Fetch cube's positions are in the robot's frame as printed: m, with the base at the origin and cubes at negative y.
     """
 
     fetch_cube_starts: tuple[Triple, ...]
-    """Where the cube starts for which each tool was designed."""
+    """Start of the cube for which each tool was designed."""
     lift_cup_sizes: tuple[Interval, ...]
     """Scales of length and width, and of height, of the cup for which each tool was designed."""
     trials: int
-    """With each tool on its own instance."""
+    """Trials of each tool on its own instance."""
     max_steps: int
     """Control steps until a trial ends without success."""
     grid_shape: tuple[int, int]
@@ -27,7 +27,7 @@ class RealRobot:
     grid_extent: Interval
     """Along the rows' and the columns' direction, m: every 6 cm and every 28.53 cm."""
     near_miss: float
-    """A cube that ends so near to success counts as nearly fetched, m."""
+    """A cube within this distance of success counts as a near miss, m."""
     fetch_cube_distance: float
     """The cube is fetched when its centre is nearer to the base, m."""
     lift_cup_height: float
@@ -35,7 +35,7 @@ class RealRobot:
     own_successes: dict[str, tuple[int, ...]]
     """Trials that succeeded by tool, of `trials`."""
     grid_successes: tuple[int, ...]
-    """Starts of the grid that succeeded by fetch-cube tool."""
+    """Successful starts of the grid by fetch-cube tool."""
 
 
 # tab:real_exp, tab:real_fetchcube, tab:real_liftcup, fig:detailed_other_inits_results and the text around them

@@ -1,4 +1,4 @@
-"""The scenes of the paper's six tasks, as the tables of its appendix print them; the LaTeX label stands beside each.
+"""The scenes of the paper's six tasks, as printed in the tables of its appendix; a comment gives each LaTeX label.
 
 Planar tasks measure in world units and degrees, three-dimensional ones in metres and degrees (the paper prints no
 units; these are our reading). Kept as printed:
@@ -20,7 +20,7 @@ from codesign_bench.studies.corl2023.ranges import Interval, Triple
 
 @dataclass(frozen=True)
 class SceneTable:
-    """What the tables of all six tasks say about the scene."""
+    """The scene's rows in the tables of all six tasks."""
 
     tool_position_init: tuple[float, ...]
     """Where the tool's fixed point starts: (x, y) in world units, or (x, y, z) in m."""

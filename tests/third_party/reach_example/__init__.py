@@ -1,1 +1,1 @@
-"""A task and two methods that live outside codesign-bench: one file each."""
+"""A task and two methods outside of codesign-bench, one file each."""

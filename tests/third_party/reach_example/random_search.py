@@ -1,4 +1,4 @@
-"""Random search over linear policies: try a neighbour of the best policy so far, keep it if it earns more.
+"""Random search over linear policies: try a neighbour of the best policy so far, and keep it if its return is higher.
 
 Shapes: `B` batch (may be absent), `O` observation, `D` design, `C` control, `G` goal, `S` state, `W` all weights.
 """
@@ -23,13 +23,13 @@ class Config:
     batch_size: int = 500
     """Environment steps spent on one candidate."""
     practice: int = 16
-    """Number of instances that all candidates are judged on, in turn: fresh ones would reward luck."""
+    """Number of instances for all candidates, in turn: new instances for each would reward luck."""
     step_size: float = 0.3
     """Standard deviation of a candidate's distance from the best policy, per weight."""
 
 
 class RandomSearch(Method[Config]):
-    """Keeps the best of random linear policies. All are judged on the same few instances."""
+    """Keeps the best of random linear policies. All are evaluated on the same few instances."""
 
     name = "random_search"
     label = "Random search"
@@ -43,7 +43,7 @@ class RandomSearch(Method[Config]):
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
-        """Return nothing: the defaults serve every profile and task."""
+        """Return no settings: the defaults are used for every profile and task."""
         return {}
 
     def train(self, remaining_steps: int) -> BatchReport:
@@ -70,14 +70,14 @@ class RandomSearch(Method[Config]):
         return State({"best": self.best}, {"best_return": self.best_return})
 
     def load_state(self, state: State) -> None:
-        """Go on from `state`."""
+        """Resume from `state`."""
         self.best, self.best_return = state.arrays["best"], state.values["best_return"]
 
     def _judge(self, policy: Policy, target: int) -> tuple[int, float]:
         """Run just enough whole episodes for `target` environment steps; return the steps and the mean return."""
         env_steps, returns = 0, np.zeros(0)
         while env_steps < target:
-            # No fewer episodes could fill what is left, so the last one is always needed.
+            # The fewest episodes that could fill the remaining steps, all at full length: none is played in vain.
             count = -(-(target - env_steps) // (self.problem.task.horizon + 1))
             chosen = np.arange(len(returns), len(returns) + count) % len(self.instances)
             lengths, wave = self._roll_out(policy, self.instances[chosen])
@@ -86,7 +86,7 @@ class RandomSearch(Method[Config]):
         return env_steps, float(returns.mean())
 
     def _roll_out(self, policy: Policy, instances: Floats) -> tuple[Floats, Floats]:
-        """Run an episode of each instance (b, I); return their lengths, the design step included, and returns, (b,)."""
+        """Run an episode of each instance (b, I); return lengths, including the design step, and returns, (b,) each."""
         running, lengths, returns = np.arange(len(instances)), np.ones(len(instances)), np.zeros(len(instances))
         with self.problem.episodes(len(instances)) as episodes:
             episodes.begin(running, instances)

@@ -1,6 +1,6 @@
 """Reach: a single link turns about its held end until its tip is at the goal. Docstring of `Reach` has the details.
 
-Shapes: `b` the slots a call names, `O` observation, `I` = 2 instance (goal distance, bearing), `D` = 1 design, `C` = 1
+Shapes: `b` the slots of a call, `O` observation, `I` = 2 instance (goal distance, bearing), `D` = 1 design, `C` = 1
 control.
 """
 
@@ -30,11 +30,11 @@ from codesign_bench.task import (
 MAX_TURN_RATE: Annotated[float, Given("rad/s", OURS)] = 2.0
 """Largest turning rate of the link."""
 MAX_HEADING: Annotated[float, Given("rad", OURS)] = 3.0
-"""The link turns no further than this to either side."""
+"""Largest angle of the link to either side."""
 LINK_RADIUS: Annotated[float, Given("m", OURS)] = 0.02
 """Half the thickness of the link."""
 CONTROL_PERIOD: Annotated[float, Given("s", OURS)] = 0.1
-"""Of a control step."""
+"""Duration of a control step."""
 GOAL_RADIUS: Annotated[float, Given("m", OURS)] = 0.1
 """The tip must come within this distance of the goal."""
 SUCCESS_REWARD: Annotated[float, Given("1", OURS)] = 1.0
@@ -63,7 +63,7 @@ class Reach(Task):
         Distances and bearings, uniform.
 
     Reward
-        The way by which the tip came nearer to the goal, and a bonus on success.
+        The decrease of the tip's distance from the goal, and a bonus on success.
 
     Starting state
         The link points along the x axis.
@@ -91,12 +91,12 @@ class Reach(Task):
     num_evaluation_instances = 32
 
     def material(self, designs: Floats) -> Floats:
-        """Return the used share of the longest link for designs (b, D) in m."""
+        """Return the length as a fraction of the longest link, for designs (b, D) in m."""
         share: Floats = designs[:, LENGTH] / self.design_space.high[LENGTH]
         return share
 
     def effort(self, controls: Floats) -> Floats:
-        """Return the share of the largest turning rate for controls (b, C) in [-1, 1]."""
+        """Return the turning rate as a fraction of the largest, for controls (b, C) in [-1, 1]."""
         share: Floats = np.abs(controls[:, TURN_RATE])
         return share
 
@@ -105,7 +105,7 @@ class Reach(Task):
         return (PlanarPart((0.0, 0.0), (float(design[LENGTH]), 0.0), LINK_RADIUS),)
 
     def script(self) -> Behaviour:
-        """Return a link as long as the goal is far that turns straight to it."""
+        """Return a script whose link is as long as the goal's distance and turns directly to it."""
         return _Script(self.layout)
 
     def make_simulator(self, num_slots: int) -> Simulator:
@@ -140,7 +140,7 @@ class _ReachSimulator(Simulator):
         self.distance = np.zeros(num_slots)
 
     def begin(self, slots: Slots, instances: Floats) -> None:
-        """Point the links along the x axis; put the goals where `instances` (b, I) say."""
+        """Point the links along the x axis; put the goals at `instances` (b, I)."""
         self.forget(slots)
         self.heading[slots] = 0.0
         self.length[slots] = 0.0

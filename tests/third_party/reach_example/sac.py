@@ -1,7 +1,7 @@
 """Soft actor-critic (Haarnoja et al. 2018) on the two-phase episode: a learner that is not PPO.
 
-The design step is one transition of the replay buffer, whose action is a design; control steps are the others. Actions
-of both phases share one vector [design | control], in which the other phase's part is zero.
+The design step is a transition in the replay buffer whose action is a design. Actions of both phases share one vector
+[design | control], in which the other phase's part is zero.
 
 Shapes: `m` transitions of a minibatch, `b` slots, `O` observation, `F` features, `D` design, `C` control, `A` = D + C.
 """
@@ -37,17 +37,17 @@ class Config:
     batch_size: int = 1_000
     """Environment steps between two rounds of updates; episodes are finished."""
     updates_per_step: float = 0.25
-    """Gradient steps for each environment step."""
+    """Gradient steps per environment step."""
     minibatch_size: int = 256
-    """Transitions of a gradient step."""
+    """Transitions per gradient step."""
     replay_size: int = 100_000
-    """Transitions that the replay buffer holds."""
+    """Capacity of the replay buffer, transitions."""
     learning_rate: float = 3e-3
-    """Adam's step size for actor, critics and temperatures."""
+    """Adam's learning rate for actor, critics and temperatures."""
     gamma: float = 0.95
-    """Discount of a step."""
+    """Discount factor per step."""
     target_rate: float = 0.02
-    """Share of a critic that its target network takes over in each step."""
+    """Fraction by which target networks move towards their critics in each step."""
     temperature: float = 0.03
     """Initial weight of the entropy, for designs and for controls; both are adapted."""
     hidden: tuple[int, ...] = (64, 64)
@@ -62,7 +62,7 @@ class SquashedActor(nn.Module):
     def __init__(self, task: Task, hidden: tuple[int, ...], rng: np.random.Generator) -> None:
         super().__init__()
         self.features = Features(task)
-        self.norm = RunningNorm.over(*self.features.boxes)  # Never updated: it scales by the spaces' bounds.
+        self.norm = RunningNorm.over(*self.features.boxes)  # never updated: scales by the bounds of the spaces
         self.sizes = [task.design_space.size, task.control_space.size]
         self.mlp = MLP([self.features.flat_size, *hidden, 2 * sum(self.sizes)], torch_generator(rng), output_scale=0.1)
 
@@ -88,12 +88,12 @@ class SquashedActor(nn.Module):
         return action * mask, (log_prob * mask).sum(1)
 
     def mask(self, observation: Tensor) -> Tensor:
-        """Return (m, A) ones where an entry of the action counts in the phase of the observation, and zeros."""
+        """Return (m, A): 1 for entries of the action that count in the observation's phase, else 0."""
         return self.features.phase(observation).repeat_interleave(torch.tensor(self.sizes), dim=1)
 
 
 class TwinCritic(nn.Module):
-    """Two networks that judge an action; the smaller of their values counts."""
+    """Two value networks for actions; the smaller of their values is used."""
 
     def __init__(self, actor: SquashedActor, hidden: tuple[int, ...], rng: np.random.Generator) -> None:
         super().__init__()
@@ -108,7 +108,7 @@ class TwinCritic(nn.Module):
 
 
 class _SquashedExplorer(Explorer):
-    """Samples the actor; nothing needs to be remembered but the actions."""
+    """Samples the actor; only the actions are stored."""
 
     def __init__(self, actor: SquashedActor) -> None:
         super().__init__(sum(actor.sizes), sum(actor.sizes))
@@ -151,7 +151,7 @@ class Sac(Method[Config]):
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
-        """Return nothing: the defaults serve every profile and task."""
+        """Return no settings: the defaults are used for every profile and task."""
         return {}
 
     def use_cores(self, count: int) -> None:
@@ -189,7 +189,7 @@ class Sac(Method[Config]):
         temperature = self._temperature(batch["observation"])
         value = self.critic(batch["observation"], action).amin(0)
         self._step("actor", (temperature.detach() * log_prob - value).mean())
-        surplus = log_prob.detach() - self.actor.mask(batch["observation"]).sum(1)  # Wanted: an entropy of -D or -C.
+        surplus = log_prob.detach() - self.actor.mask(batch["observation"]).sum(1)  # target entropy: -D or -C
         self._step("temperature", -(temperature.log() * surplus).mean())
         with torch.no_grad():
             for slow, fast in zip(self.target.networks.parameters(), self.critic.networks.parameters(), strict=True):
@@ -198,7 +198,7 @@ class Sac(Method[Config]):
         return {name: number.item() for name, number in found.items()}
 
     def _critic_loss(self, batch: Mapping[str, Tensor], noise: Tensor) -> Tensor:
-        """Return the critics' squared error () from the soft value of what followed; the time limit is bootstrapped."""
+        """Return the critics' squared error () from the next state's soft value; the time limit is bootstrapped."""
         following = batch["next_observation"]
         with torch.no_grad():
             action, log_prob = self.actor.sample(following, noise)
@@ -208,7 +208,7 @@ class Sac(Method[Config]):
         return ((values - target) ** 2).mean(1).sum()
 
     def _temperature(self, observation: Tensor) -> Tensor:
-        """Return the temperature (m,) of the phase that each observation (m, O) is in."""
+        """Return the temperature (m,) of the phase of each observation (m, O)."""
         return (self.actor.features.phase(observation) @ self.temperature[0]).exp()
 
     def _step(self, name: str, loss: Tensor) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from codesign_bench import plugins, registry
 from codesign_bench.sweep.training import CHECKPOINT_SECONDS_VARIABLE
+from toy import GATE_VARIABLE, Gate
 
 TESTS = Path(__file__).parent
 
@@ -44,6 +45,14 @@ def toy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(registry.IMPORTS_VARIABLE, "")
     monkeypatch.setattr(registry, "_registered", {})
     plugins.import_modules(["toy"])
+
+
+@pytest.fixture
+def gate(toy: None, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Gate:
+    """A gate for the cells that are started from here; open at first."""
+    path = tmp_path_factory.mktemp("gate") / "steps"
+    monkeypatch.setenv(GATE_VARIABLE, str(path))
+    return Gate(path)
 
 
 @pytest.fixture

@@ -1,7 +1,8 @@
 """A task and a method small enough to run in milliseconds, for tests of everything around them.
 
 `toy_reach`: a stick of 0.1 to 1 m, held at 0 m, shall touch a goal on a line; its foot moves 0.1 m a step.
-`toy_search`: random search over a constant design and control; options make it slow, fail or kill itself.
+`toy_search`: random search over a constant design and control; options make it slow, fail or kill itself. A file may
+hold it up, too: while the file named by `TOY_GATE` holds a number, nothing is trained beyond so many steps.
 
 Shapes: `B` batch (may be absent), `b` slots that a call names, `O` observation, `D` design, `C` control, `I` instance.
 """
@@ -13,6 +14,7 @@ import signal
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,7 @@ from codesign_bench.method import Array, BatchReport, Method, Policy, Problem, S
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Booleans, Box, Floats, Simulator, Singles, Slots, Task, ToolGraph
 
+GATE_VARIABLE = "TOY_GATE"
 STEP = 0.1
 TOLERANCE = 0.05
 
@@ -85,6 +88,31 @@ class _Sticks(Simulator):
         self.state[slots, 0] = self._tip[slots]
 
 
+class Gate:
+    """Holds up every cell of `toy_search`, here and in other processes."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def close_at(self, env_steps: int) -> None:
+        """Let no cell train further once it has taken `env_steps`."""
+        part = self.path.with_suffix(".part")
+        part.write_text(str(env_steps))
+        part.replace(self.path)
+
+    def open(self) -> None:
+        """Hold up nothing any more."""
+        self.path.unlink(missing_ok=True)
+
+
+def _gate() -> float:
+    """Return the environment steps up to which training may go."""
+    try:
+        return float(Path(os.environ[GATE_VARIABLE]).read_text())
+    except (KeyError, FileNotFoundError):
+        return np.inf
+
+
 @dataclass(frozen=True)
 class Config:
     """Options of the search."""
@@ -139,6 +167,8 @@ class ToySearch(Method[Config]):
 
     def _misbehave(self) -> None:
         time.sleep(self.config.delay)
+        while self.env_steps >= _gate():
+            time.sleep(0.01)
         if self.config.fail_at is not None and self.env_steps >= self.config.fail_at:
             raise RuntimeError("the toy broke")
         if self.config.die_at is not None and self.env_steps >= self.config.die_at:

@@ -90,8 +90,9 @@ def test_every_command_reads_it(results: Path, tmp_path: Path, capsys: pytest.Ca
     policy = str(results / "fetch_cube" / "gnn_ppo" / "default" / "seed-00")
     for command in (
         ["status", "--results", str(results)],
-        ["plot", "--results", str(results), "--out", str(out / "figures")],
+        ["plot", "learning_curves", "qualitative_tools", "--results", str(results), "--out", str(out / "figures")],
         ["verify", "--results", str(results), "--out", str(out / "claims")],
+        # The report draws every figure.
         ["report", "--results", str(results), "--out", str(out / "report.html")],
         ["render", "--policy", policy, "--episodes", "1", "--out", str(out / "fetch_cube.png")],
         ["export", "--policy", policy, "--instances", "0", "--out", str(out / "tools")],

@@ -21,6 +21,7 @@ from codesign_bench.cli import main
 from codesign_bench.errors import UserError
 from codesign_bench.storage.layout import PROGRESS_FILE
 from codesign_bench.sweep.runner import run_sweep
+from toy import Gate
 
 distributed: Any = pytest.importorskip("distributed")
 
@@ -28,15 +29,15 @@ pytestmark = pytest.mark.usefixtures("toy", "every_batch")
 
 
 @pytest.fixture
-def cluster(toy: None) -> Iterator[Any]:
+def cluster(gate: Gate) -> Iterator[Any]:
     """Two workers on this machine; their environment is that of the test."""
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as running:
         yield running
 
 
-def cells(delay: float = 0.0, fail: bool = False) -> list[Cell]:
-    """Return four toy cells; each batch of about twenty takes `delay` seconds, and the last cell may fail."""
-    overrides = ("evaluations=4", f"delay={delay}", *(("fail_at=100",) if fail else ()))
+def cells(fail: bool = False) -> list[Cell]:
+    """Return four toy cells of about twenty batches, which may fail."""
+    overrides = ("evaluations=4", *(("fail_at=100",) if fail else ()))
     return list(grid(tasks=["toy_reach"], methods=["toy_search"], seeds=range(4), steps=400, overrides=overrides))
 
 
@@ -52,26 +53,32 @@ def curves(out: Path) -> Any:
     return load_results(out).drop(columns="wall_s")
 
 
-def test_a_killed_worker_costs_no_cell_and_changes_no_curve(cluster: Any, tmp_path: Path) -> None:
+def test_a_killed_worker_costs_no_cell_and_changes_no_curve(cluster: Any, gate: Gate, tmp_path: Path) -> None:
     here, there = tmp_path / "here", tmp_path / "there"
-    assert sweep(cells(delay=0.05), here)[0] == 0
+    assert sweep(cells(), here)[0] == 0
 
     def kill_a_worker() -> None:
-        while len(list(there.glob(f"*/*/*/*/{PROGRESS_FILE}"))) < 2:
-            time.sleep(0.05)
-        with distributed.Client(cluster.scheduler_address, set_as_default=False) as client:
-            os.kill(next(iter(client.run(os.getpid).values())), signal.SIGKILL)
-        killed.set()
+        try:
+            while len(list(there.glob(f"*/*/*/*/{PROGRESS_FILE}"))) < 2 and time.monotonic() < deadline:
+                time.sleep(0.05)
+            with distributed.Client(cluster.scheduler_address, set_as_default=False) as client:
+                workers = client.run(os.getpid)
+            os.kill(next(iter(workers.values())), signal.SIGKILL)
+            killed.set()
+        finally:
+            gate.open()
 
     killed = threading.Event()
+    deadline = time.monotonic() + 120.0
+    gate.close_at(200)  # Both workers have a cell that is not done when one of them is killed.
     killer = threading.Thread(target=kill_a_worker, daemon=True)
     killer.start()
-    code, text = sweep(cells(delay=0.05), there, backend="dask", scheduler=cluster.scheduler_address)
-    killer.join(timeout=10.0)
+    code, text = sweep(cells(), there, backend="dask", scheduler=cluster.scheduler_address)
+    killer.join()
     assert killed.is_set()
     assert code == 0, text
     assert curves(here).equals(curves(there))
-    code, text = sweep(cells(delay=0.05), there, backend="dask", scheduler=cluster.scheduler_address)
+    code, text = sweep(cells(), there, backend="dask", scheduler=cluster.scheduler_address)
     assert (code, "4 of them already done" in text) == (0, True)
 
 

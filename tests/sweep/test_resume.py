@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -16,20 +17,21 @@ import pytest
 from codesign_bench import load_results
 from codesign_bench.storage.layout import CHECKPOINT_FILE, is_locked
 from codesign_bench.storage.records import CellRecord
+from toy import Gate
 
 pytestmark = pytest.mark.usefixtures("toy", "every_batch")
 
-# Slow batches, so that a kill lands in the middle; seconds are no part of what is compared.
-ARGUMENTS = ("run", "--method", "toy_search", "--task", "toy_reach", "--steps", "1500", "--set", "evaluations=6")
-SLOW = ("delay=0.03",)
+STEPS = 1_500
+ARGUMENTS = ("run", "--method", "toy_search", "--task", "toy_reach", "--set", "evaluations=6")
+SLOW = ("delay=0.01",)
+"""Batches that last, so that a kill lands in the middle of one."""
 PATIENCE_SECONDS = 120.0
 SEED_FOLDER = Path("toy_reach/toy_search/default/seed-00")
 
 
-def wait_for(condition: object, seconds: float = PATIENCE_SECONDS) -> None:
-    """Wait until `condition()` holds."""
-    assert callable(condition)
-    deadline = time.monotonic() + seconds
+def wait_for(condition: Callable[[], bool]) -> None:
+    """Wait until `condition()` holds; it always does in the end, unless something is broken."""
+    deadline = time.monotonic() + PATIENCE_SECONDS
     while not condition():
         assert time.monotonic() < deadline, "waited in vain"
         time.sleep(0.02)
@@ -62,7 +64,7 @@ def kill_and_wait(process: subprocess.Popen[str], out: Path) -> None:
     """Kill the main process alone, and wait until no cell is left running: its process gives up its lock."""
     process.kill()
     process.communicate(timeout=PATIENCE_SECONDS)
-    wait_for(lambda: not any(map(is_locked, cell_folders(out))), seconds=10.0)
+    wait_for(lambda: not any(map(is_locked, cell_folders(out))))
 
 
 def cell_folders(out: Path) -> list[Path]:
@@ -73,20 +75,18 @@ def curve(out: Path) -> pd.DataFrame:
     return load_results(out).drop(columns="wall_s")
 
 
-def kill_repeatedly(out: Path, kills: int, arguments: tuple[str, ...]) -> int:
-    """Kill a sweep `kills` times at random moments after its first checkpoint, or until it ends; return the kills."""
+def kill_repeatedly(out: Path, kills: int, arguments: tuple[str, ...], gate: Gate, steps: int = STEPS) -> None:
+    """Kill a sweep `kills` times, each time at a random moment after a new checkpoint and before its end."""
     moments = random.Random(1)
-    for count in range(kills):
-        process = start(*arguments, "--out", out)
-        folder = out / SEED_FOLDER
-        before = _changed(folder)
-        wait_for(lambda: process.poll() is not None or _changed(folder) != before)  # noqa: B023  # used in this turn
+    for count in range(1, kills + 1):
+        gate.close_at(steps * count // (kills + 1))
+        before = _changed(out / SEED_FOLDER)
+        process = start(*arguments, "--steps", str(steps), "--out", out)
+        wait_for(lambda: _changed(out / SEED_FOLDER) != before)  # noqa: B023  # used in this turn
         time.sleep(moments.uniform(0.0, 0.4))
-        if process.poll() is not None:
-            process.communicate()
-            return count
+        assert process.poll() is None, process.communicate()
         kill_and_wait(process, out)
-    return kills
+    gate.open()
 
 
 def _changed(folder: Path) -> float:
@@ -96,58 +96,69 @@ def _changed(folder: Path) -> float:
         return 0.0
 
 
-def compare_killed_with_undisturbed(tmp_path: Path, kills: int, arguments: tuple[str, ...]) -> None:
-    killed = kill_repeatedly(tmp_path / "killed", kills, arguments)
-    assert killed == kills, "the sweep ended before it was killed often enough"
-    assert finish(start(*arguments, "--out", tmp_path / "killed"))[0] == 0
-    assert finish(start(*arguments, "--out", tmp_path / "undisturbed"))[0] == 0
+def compare_killed_with_undisturbed(
+    tmp_path: Path, kills: int, arguments: tuple[str, ...], gate: Gate, steps: int = STEPS
+) -> None:
+    kill_repeatedly(tmp_path / "killed", kills, arguments, gate, steps)
+    for name in ("killed", "undisturbed"):
+        code, text = finish(start(*arguments, "--steps", str(steps), "--out", tmp_path / name))
+        assert code == 0, text
     pd.testing.assert_frame_equal(curve(tmp_path / "killed"), curve(tmp_path / "undisturbed"), check_exact=True)
     for name in ("metrics.csv", "evaluation.csv", "policy.safetensors"):
         files = [tmp_path / run / SEED_FOLDER / name for run in ("killed", "undisturbed")]
         assert files[0].read_bytes() == files[1].read_bytes()
 
 
-def test_two_kills_lose_nothing(tmp_path: Path) -> None:
-    compare_killed_with_undisturbed(tmp_path, 2, (*ARGUMENTS, *SLOW))
+def test_two_kills_lose_nothing(tmp_path: Path, gate: Gate) -> None:
+    compare_killed_with_undisturbed(tmp_path, 2, (*ARGUMENTS, *SLOW), gate)
 
 
 @pytest.mark.slow
-def test_twenty_kills_lose_nothing(tmp_path: Path) -> None:
-    arguments = (*ARGUMENTS[:6], "12000", *ARGUMENTS[7:], "delay=0.02")
-    compare_killed_with_undisturbed(tmp_path, 20, (*arguments, "--seeds", "2"))
+def test_twenty_kills_lose_nothing(tmp_path: Path, gate: Gate) -> None:
+    compare_killed_with_undisturbed(tmp_path, 20, (*ARGUMENTS, *SLOW, "--seeds", "2"), gate, steps=12_000)
 
 
-def test_wall_time_goes_on_from_the_interruption(tmp_path: Path) -> None:
-    kill_repeatedly(tmp_path, 1, (*ARGUMENTS, *SLOW))
-    assert finish(start(*ARGUMENTS, *SLOW, "--out", tmp_path))[0] == 0
+def test_wall_time_goes_on_from_the_interruption(tmp_path: Path, gate: Gate) -> None:
+    arguments = (*ARGUMENTS, "delay=0.03")
+    kill_repeatedly(tmp_path, 1, arguments, gate)
+    code, text = finish(start(*arguments, "--steps", str(STEPS), "--out", tmp_path))
+    assert code == 0, text
     frame = load_results(tmp_path)
     assert frame["wall_s"].is_monotonic_increasing
     record = CellRecord.read(tmp_path / SEED_FOLDER)
     assert record is not None
-    assert float(record.timings.wall_s or 0.0) >= float(record.timings.train_s or 0.0) > 1.0
+    batches = len(pd.read_csv(tmp_path / SEED_FOLDER / "metrics.csv"))
+    assert float(record.timings.wall_s or 0.0) >= float(record.timings.train_s or 0.0) >= batches * 0.03
 
 
-def test_ctrl_c_says_how_to_go_on_and_leaves_no_process(tmp_path: Path) -> None:
-    process = start(*ARGUMENTS, "delay=0.2", "--seeds", "2", "--out", tmp_path)
-    wait_for(lambda: len(list(tmp_path.glob(f"*/*/*/*/{CHECKPOINT_FILE}"))) >= 1 or process.poll() is not None)
+def interruptible(out: Path, gate: Gate) -> subprocess.Popen[str]:
+    """Start a sweep of two cells that does not end while the gate is closed; wait until one has been saved."""
+    gate.close_at(STEPS // 2)
+    process = start(*ARGUMENTS, *SLOW, "--steps", str(STEPS), "--seeds", "2", "--out", out)
+    wait_for(lambda: any(out.glob(f"*/*/*/*/{CHECKPOINT_FILE}")))
+    return process
+
+
+def test_ctrl_c_says_how_to_go_on_and_leaves_no_process(tmp_path: Path, gate: Gate) -> None:
+    process = interruptible(tmp_path, gate)
     process.send_signal(signal.SIGINT)
     code, text = finish(process)
     assert code == 130
     assert text.strip().splitlines()[-1] == "interrupted; the same command resumes"
     assert "Traceback" not in text
-    wait_for(lambda: not any(map(is_locked, cell_folders(tmp_path))), seconds=10.0)
+    wait_for(lambda: not any(map(is_locked, cell_folders(tmp_path))))
     assert "interrupted" in finish(start("status", "--results", tmp_path))[1]
 
 
-def test_a_killed_worker_does_not_end_the_sweep(tmp_path: Path) -> None:
+def test_a_killed_worker_does_not_end_the_sweep(tmp_path: Path, gate: Gate) -> None:
     if len(os.sched_getaffinity(0)) < 2:
         pytest.skip("one core means no joblib workers")
-    process = start(*ARGUMENTS, "delay=0.05", "--seeds", "2", "--out", tmp_path)
-    wait_for(lambda: len(list(tmp_path.glob(f"*/*/*/*/{CHECKPOINT_FILE}"))) >= 1 or process.poll() is not None)
+    process = interruptible(tmp_path, gate)
     record = CellRecord.read(next(tmp_path.glob(f"*/*/*/*/{CHECKPOINT_FILE}")).parent)
     assert record is not None
     assert record.pid is not None
     os.kill(parent_of(record.pid), signal.SIGKILL)
+    gate.open()
     code, text = finish(process)
     assert code == 0, text
     assert "a worker process died" in text
@@ -155,7 +166,7 @@ def test_a_killed_worker_does_not_end_the_sweep(tmp_path: Path) -> None:
 
 
 def test_two_sweeps_on_one_folder_share_the_work(tmp_path: Path) -> None:
-    arguments = (*ARGUMENTS[:6], "300", *ARGUMENTS[7:], *SLOW, "--seeds", "2", "--jobs", "1", "--out", str(tmp_path))
+    arguments = (*ARGUMENTS, *SLOW, "--steps", "300", "--seeds", "2", "--jobs", "1", "--out", str(tmp_path))
     sweeps = [start(*arguments) for _ in range(2)]
     for code, text in map(finish, sweeps):
         assert code == 0, text

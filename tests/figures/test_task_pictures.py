@@ -33,7 +33,7 @@ def test_the_picture_is_of_a_moment_after_the_start_and_before_the_end(tmp_path:
 def test_a_task_without_script_or_picture_is_left_out_by_name(tmp_path: Path) -> None:
     logged: list[str] = []
     store_cell(tmp_path, task="toy_reach")
-    with pytest.raises(UserError, match="no task here"):
+    with pytest.raises(UserError, match="none of the tasks has both"):
         tasks_at_work(Request(tmp_path, logged.append))
     assert logged == ["picture of toy_reach left out: task 'toy_reach' has no script"]
 

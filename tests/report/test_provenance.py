@@ -59,6 +59,6 @@ def test_the_commit_is_told_where_the_code_is_a_checkout_and_nowhere_else(tmp_pa
     git(tmp_path, "add", ".")
     git(tmp_path, "commit", "--message", "one")
     assert code_version(package).startswith(f"{version}, commit ")
-    assert "not committed" not in code_version(package)
+    assert "uncommitted changes" not in code_version(package)
     (package / "__init__.py").write_text("changed = True\n")
-    assert code_version(package).endswith("not committed")
+    assert code_version(package).endswith("uncommitted changes")

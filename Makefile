@@ -17,6 +17,8 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip
 SETUP := setup.cfg pyproject.toml constraints.txt
 
+# Processes that run the fast tests; the tests of a file stay together, for they share what is made once for a file.
+WORKERS ?= 2
 NUMERIC_TESTS := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -p no:cacheprovider -m "numeric and not slow"
 
 TASK ?= push
@@ -46,7 +48,7 @@ test: .venv/installed-test ## set up, check style and types, run the fast tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 test-portable: .venv/installed-test ## run the tests that compare numbers under other instruction sets
 	$(MAKE) --no-print-directory -j2 --output-sync=target without-avx512 without-avx

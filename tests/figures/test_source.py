@@ -33,7 +33,7 @@ def test_tasks_are_those_of_the_cells_each_once(tmp_path: Path) -> None:
         store_cell(tmp_path, task=task, seed=seed, status=RUNNING)
     assert sorted(tasks_in(tmp_path)) == ["push", "scoop"]
     (tmp_path / "empty").mkdir()
-    with pytest.raises(UserError, match="name the figure to draw it without any"):
+    with pytest.raises(UserError, match="give the figure's name to draw it without cells"):
         tasks_in(tmp_path / "empty")
 
 

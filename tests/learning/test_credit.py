@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,12 @@ import torch
 
 from codesign_bench.learning.credit import JointCredit, NoCredit, SeparateCredit, Steps
 from codesign_bench.learning.ppo import gaussian
+from codesign_bench.learning.ppo_method import PPOMethod
 from codesign_bench.learning.trajectories import Trajectories
 from codesign_bench.learning.two_phase import TwoPhaseLearner
-from codesign_bench.task import Floats, Singles, Slots
+from codesign_bench.method import Problem, load_method, method_names
+from codesign_bench.seeding import Streams
+from codesign_bench.task import Floats, Singles, Slots, Task
 from tolerances import of_log_prob, of_network, of_sum
 
 pytestmark = pytest.mark.numeric
@@ -103,6 +107,21 @@ def test_separate_credit_gives_a_design_its_undiscounted_return(make_learner: Ma
     episodes = np.cumsum(batch.is_design[batch.valid]) - 1  # The episode that each valid step belongs to.
     returns = np.bincount(episodes, batch.reward[batch.valid])
     assert_normalized_alike(recorder.policies[1].advantage, returns)
+
+
+@pytest.mark.parametrize("name", [name for name in method_names() if issubclass(load_method(name), PPOMethod)])
+def test_a_control_update_alone_never_stops_the_design_update(name: str, reach: Task) -> None:
+    method_class: Any = load_method(name)
+    steps_of_designs = {**method_class.small(), "design_epochs": 3, "design_minibatch_size": 20}
+    # Control steps go as far as they like; design steps have no length, so all that moves the designer is the trunk.
+    settings = {"design_credit": "separate", "policy_learning_rate": 0.1, "kl_threshold": 1e9}
+    settings |= {"design_learning_rate": 0.0, "design_kl_threshold": 1e-6}
+    config = replace(method_class.config_class(), **(steps_of_designs | settings))
+    method = method_class(Problem(reach), config, Streams(0))
+    report = method.train(BUDGET)
+    assert report.metrics["kl"] > 1e3 * config.design_kl_threshold
+    assert report.metrics["design_steps"] >= config.design_epochs
+    assert report.metrics["design_kl"] < config.design_kl_threshold
 
 
 def test_designs_that_are_given_are_not_learned(make_learner: MakeLearner, recorder: Any) -> None:

@@ -11,13 +11,14 @@ import pytest
 import torch
 
 from codesign_bench.learning.credit import JointCredit, NoCredit, SeparateCredit, Steps
+from codesign_bench.learning.explorer import Trial
 from codesign_bench.learning.ppo import gaussian
 from codesign_bench.learning.ppo_method import PPOMethod
 from codesign_bench.learning.trajectories import Trajectories
 from codesign_bench.learning.two_phase import TwoPhaseLearner
 from codesign_bench.method import Problem, load_method, method_names
 from codesign_bench.seeding import Streams
-from codesign_bench.task import Floats, Singles, Slots, Task
+from codesign_bench.task import Floats, Task
 from tolerances import of_log_prob, of_network, of_sum
 
 pytestmark = pytest.mark.numeric
@@ -26,9 +27,9 @@ MakeLearner = Callable[..., TwoPhaseLearner]
 BUDGET = 10_000
 
 
-def middle(slots: Slots) -> Singles:
-    """Choose the middle of the design space for every slot (b,)."""
-    return np.zeros((len(slots), 1), np.float32)
+def middle(steps: int, slots: int) -> Trial:
+    """Choose the middle of the design space for every slot."""
+    return Trial(np.zeros((slots, 1), np.float32))
 
 
 def assert_normalized_alike(found: torch.Tensor, values: Floats) -> None:
@@ -57,8 +58,8 @@ def make_constant(network: torch.nn.Module, value: float) -> None:
     [
         ({"design_credit": "joint"}, JointCredit),
         ({"design_credit": "separate"}, SeparateCredit),
-        ({"design_credit": "separate", "choose_designs": middle}, NoCredit),
-        ({"design_credit": "joint", "choose_designs": middle}, NoCredit),
+        ({"design_credit": "separate", "choose_trial": middle}, NoCredit),
+        ({"design_credit": "joint", "choose_trial": middle}, NoCredit),
     ],
 )
 def test_the_configuration_chooses_the_credit(
@@ -125,7 +126,7 @@ def test_a_control_update_alone_never_stops_the_design_update(name: str, reach: 
 
 
 def test_designs_that_are_given_are_not_learned(make_learner: MakeLearner, recorder: Any) -> None:
-    learner = make_learner(fix_std=False, choose_designs=middle, loop=recorder)
+    learner = make_learner(fix_std=False, choose_trial=middle, loop=recorder)
     head = {name: tensor.clone() for name, tensor in learner.actor.named_parameters() if "design" in name}
     _, batch = learner.train(BUDGET)
     for name, tensor in learner.actor.named_parameters():

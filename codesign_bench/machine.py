@@ -9,7 +9,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-PACKAGES = ("codesign_bench", "numpy", "torch", "pymunk", "pybullet", "cma", "gymnasium")
+from codesign_bench import __version__
+
+PACKAGES = ("numpy", "torch", "pymunk", "pybullet", "cma", "gymnasium")
 BFLOAT16_FLAGS = ("amx_bf16", "avx512_bf16", "bf16")
 """CPU flags that indicate bfloat16 arithmetic: two of x86 (Intel, AMD) and one of ARM."""
 
@@ -22,8 +24,11 @@ def available_cores() -> int:
 
 
 def package_versions() -> dict[str, str | None]:
-    """Return the versions of Python and of `PACKAGES` without importing them; None: not installed."""
-    found: dict[str, str | None] = {"python": platform.python_version()}
+    """Return the versions of Python, of this package and of `PACKAGES` without importing these; None: not installed.
+
+    This package's is that of the code that runs: what `pip` knows of a checkout is as old as its last installation.
+    """
+    found: dict[str, str | None] = {"python": platform.python_version(), "codesign_bench": __version__}
     for name in PACKAGES:
         try:
             found[name] = version(name)

@@ -1,15 +1,18 @@
-"""What tests of the rules share: evidence made of numbers that can be checked by hand, and what a rule finds in it."""
+"""What tests of claims share: evidence made of numbers that can be checked by hand, in frames and on disk."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from builders import rising, store_cell
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import Finding
+from codesign_bench.storage.records import DONE
 
 TASK, OURS, OTHER = "push", "gnn_ppo", "cma_rl"
 
@@ -49,3 +52,19 @@ def curves(
         "success_rate": np.zeros(len(seeds)) if success is None else np.ravel(success),
     }
     return cells(method, variant, task=task, **columns)
+
+
+def make_cell(out: Path, method: str, seed: int, final: float, status: str = DONE) -> Path:
+    """Write a cell of push that rises from 0 to `final`, and return its folder."""
+    row = {"return": final, "success": 0, "episode_length": 5, "material": 0.5, "effort": 0.5}
+    lengths = {f"design_link_{link}_length": 1.0 for link in (1, 2, 3)}
+    angles = {f"design_joint_{joint}_angle": 0.0 for joint in (1, 2)}
+    evaluation = [{**row, **lengths, **angles}] * 2
+    return store_cell(out, method=method, seed=seed, status=status, curve=rising(0.0, final), evaluation=evaluation)
+
+
+def make_results(out: Path) -> None:
+    """Write three seeds each of two methods, all of one tool."""
+    for seed in range(3):
+        make_cell(out, "gnn_ppo", seed, 2.0)
+        make_cell(out, "cma_rl", seed, 1.0)

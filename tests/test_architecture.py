@@ -1,4 +1,4 @@
-"""Who may import whom, and that the packages listed for installation are the folders on disk."""
+"""Who may import whom, that tests mirror the code, and that the packages listed for installation are those on disk."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from codesign_bench.registry import built_in
+from codesign_bench.registry import built_in, presented
 from codesign_bench.study import DEFAULT_STUDY, load_study
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -22,6 +22,52 @@ FLAT_FOLDERS = ("methods", "tasks", "paper_figs")
 CORE = sorted((ROOT / "codesign_bench").rglob("*.py"))
 OUTSIDE_STUDIES = [path for path in CORE if "studies" not in path.relative_to(ROOT).parts]
 LEARNING = ROOT / "codesign_bench" / "learning"
+MEMBERS = {"methods": "methods", "tasks": "tasks", "paper_figs": "paper_figs", "studies": "codesign_bench/studies"}
+"""Group of members -> its folder."""
+
+EVERY_METHOD = "tests/methods/test_contract.py and tests/methods/test_honesty.py ask every method"
+PRINTED = "numbers that the paper prints"
+TESTED_ELSEWHERE = {
+    "codesign_bench/claims/claim.py": "data alone; tests/claims/test_verify.py judges claims made of it",
+    "codesign_bench/learning/ppo_method.py": f"an abstract class; {EVERY_METHOD}, most of which extend it",
+    "codesign_bench/studies/corl2023/learners.py": f"{PRINTED}; tests/studies/corl2023/test_tables.py",
+    "codesign_bench/studies/corl2023/members.py": "names alone; tests/study/test_study.py resolves every cell of them",
+    "codesign_bench/studies/corl2023/protocol.py": f"{PRINTED}; tests/studies/corl2023/test_tables.py",
+    "codesign_bench/studies/corl2023/ranges.py": "names of types; tests/studies/corl2023/test_tables.py reads values",
+    "codesign_bench/studies/corl2023/real_robot.py": f"{PRINTED}; tests/studies/corl2023/test_scenes.py",
+    "codesign_bench/task/behaviour.py": "an interface; tests/task/test_behaviours.py and tests/task/test_play.py",
+    "codesign_bench/task/tool.py": "data alone; tests/tasks/test_contract.py asks what every task makes of it",
+    "methods/cma_es.py": EVERY_METHOD,
+    "methods/cma_rl.py": EVERY_METHOD,
+    "methods/gnn_ppo.py": EVERY_METHOD,
+    "methods/hwasp_minimal.py": EVERY_METHOD,
+    "methods/shared_arch.py": EVERY_METHOD,
+}
+"""Modules without a test file of their own -> why, and which tests cover them."""
+
+OF_NO_MODULE = {
+    "tests/docs/test_make_task_pages.py": "of the script docs/make_task_pages.py",
+    "tests/docs/test_pages.py": "of the documentation",
+    "tests/learning/test_pendulum.py": "of the whole learner, beside another library's",
+    "tests/learning/test_plain_update.py": "of all of an update's modules together, beside a plain one",
+    "tests/methods/test_contract.py": "of every method",
+    "tests/methods/test_honesty.py": "of every method: that it is what it says",
+    "tests/methods/test_start_from.py": "of every method",
+    "tests/results/test_reference.py": "of the shipped results",
+    "tests/results/test_ship_cells.py": "of the script results/ship_cells.py",
+    "tests/stats/test_rliable.py": "of all statistics, beside another library's",
+    "tests/storage/test_version_0_1_0.py": "of the whole program, on results of an earlier version",
+    "tests/studies/corl2023/test_tables.py": "of several modules of data, beside the paper's tables",
+    "tests/sweep/test_resume.py": "of whole sweeps that are killed",
+    "tests/tasks/_scripts/test_contract.py": "of every script",
+    "tests/tasks/test_contract.py": "of every task",
+    "tests/tasks/test_soundness.py": "of every task: that its physics are sound",
+    "tests/test_architecture.py": "of the code as a whole",
+    "tests/test_packaging.py": "of the package as it installs",
+    "tests/test_portable.py": "of the settings under which `make test-portable` runs",
+    "tests/test_third_party.py": "of the whole program, with members of another package",
+}
+"""Test files that belong to no single module -> what they are tests of."""
 
 
 def files(folder: str) -> list[Path]:
@@ -112,6 +158,45 @@ def test_the_listed_packages_are_the_folders_on_disk() -> None:
     assert listed == on_disk
     mapped = dict(line.split(" = ") for line in setup["options"]["package_dir"].strip().splitlines())
     assert mapped == {f"codesign_bench.{folder}": folder for folder in FLAT_FOLDERS}
+
+
+def is_of_its_own(path: Path) -> bool:
+    """Return whether a module is a member that is not presented: one file is all that it needs."""
+    groups = [group for group, folder in MEMBERS.items() if path.parent == ROOT / folder]
+    return any(not path.stem.startswith("_") and path.stem not in presented(group) for group in groups)
+
+
+def mirror_of(path: Path) -> str:
+    """Return where the tests of a module belong: `a/_b.py` is tested by `tests/a/test_b.py`."""
+    folder = path.parent.relative_to(ROOT)
+    folder = folder.relative_to("codesign_bench") if folder.parts[0] == "codesign_bench" else folder
+    return (Path("tests") / folder / f"test_{path.stem.lstrip('_')}.py").as_posix()
+
+
+MIRRORED = {
+    path.relative_to(ROOT).as_posix(): mirror_of(path)
+    for path in (*CORE, *(path for folder in FLAT_FOLDERS for path in files(folder)))
+    if not path.stem.startswith("__") and not is_of_its_own(path)
+}
+"""Module -> its test file."""
+TEST_FILES = {path.relative_to(ROOT).as_posix() for path in (ROOT / "tests").rglob("test_*.py")}
+
+
+def test_every_module_has_its_test_file_or_a_reason_why_not() -> None:
+    without = {module for module, test_file in MIRRORED.items() if test_file not in TEST_FILES}
+    assert without == set(TESTED_ELSEWHERE), "a reason is stale once its module is gone or has its test file"
+
+
+def test_every_test_file_is_named_after_a_module_or_says_what_else_it_tests() -> None:
+    others = TEST_FILES - {mirror_of(path) for path in (*CORE, *(p for f in FLAT_FOLDERS for p in files(f)))}
+    assert others == set(OF_NO_MODULE), "a reason is stale once its test file is gone or has its module"
+
+
+@pytest.mark.parametrize("module", TESTED_ELSEWHERE)
+def test_a_reason_names_test_files_that_there_are(module: str) -> None:
+    named = re.findall(r"tests/\S+\.py", TESTED_ELSEWHERE[module])
+    assert named
+    assert set(named) <= TEST_FILES
 
 
 def reached(module: str, edges: dict[str, set[str]]) -> set[str]:

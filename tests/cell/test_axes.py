@@ -53,12 +53,6 @@ def test_a_cutout_and_a_tradeoff_are_parts_of_the_problem() -> None:
     assert (plain.cutout, plain.tradeoff, plain.instances) == (0.0, None, None)
 
 
-def test_fine_tuning_starts_from_the_cell_that_varies_all_else() -> None:
-    fine_tuned, from_scratch = cells(variants=[Variant.of(cutout=0.5, finetune=1), Variant.of(scratch=2)])
-    assert fine_tuned.pretrained == cells(variants=[Variant.of(cutout=0.5)])[0]
-    assert from_scratch.pretrained is None
-
-
 def test_fine_tuning_starts_where_training_ended_and_scratch_does_not(trained: Path) -> None:
     wanted = cells(2, variants=STARTS)
     assert sweep(wanted, trained)[0] == 0

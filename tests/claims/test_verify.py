@@ -1,18 +1,13 @@
-"""`codesign-bench verify`: a row per claim, printed and written, and bad input answered in a line."""
+"""Claims are judged one by one, and their verdicts counted, told and written."""
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pytest
 
-from builders import rising, store_cell
 from codesign_bench.claims.claim import Claim, Rule
 from codesign_bench.claims.evidence import Evidence, load_evidence
 from codesign_bench.claims.finding import (
@@ -20,20 +15,14 @@ from codesign_bench.claims.finding import (
     NOT_ASKED,
     SUPPORTED,
     UNDECIDED,
-    VERDICTS,
     Finding,
     InsufficientData,
 )
 from codesign_bench.claims.verify import as_json, as_markdown, judge, missing, summary
-from codesign_bench.cli import main
 from codesign_bench.cli.program import build_parser
-from codesign_bench.errors import UserError
-from codesign_bench.storage.frames import default_rows, load_results
-from codesign_bench.storage.records import DONE, FAILED, RUNNING
 from codesign_bench.study.study import Study, load_study, study_names
+from evidence import make_results
 
-ROOT = Path(__file__).resolve().parents[2]
-REFERENCE = ROOT / "results" / "reference"
 PAPER = load_study("corl2023")
 CLAIMS = PAPER.claims()
 ALL_CLAIMS = [claim for name in study_names() for claim in load_study(name).claims()]
@@ -42,22 +31,6 @@ ALL_CLAIMS = [claim for name in study_names() for claim in load_study(name).clai
 def study_of(claims: Sequence[Claim]) -> Study:
     """Return a study that has these claims alone."""
     return Study(name="small", title="A small study", question="Is it so?", claims=lambda: claims)
-
-
-def make_cell(out: Path, method: str, seed: int, final: float, status: str = DONE) -> Path:
-    """Write a cell of push that rises from 0 to `final`, and return its folder."""
-    row = {"return": final, "success": 0, "episode_length": 5, "material": 0.5, "effort": 0.5}
-    lengths = {f"design_link_{link}_length": 1.0 for link in (1, 2, 3)}
-    angles = {f"design_joint_{joint}_angle": 0.0 for joint in (1, 2)}
-    evaluation = [{**row, **lengths, **angles}] * 2
-    return store_cell(out, method=method, seed=seed, status=status, curve=rising(0.0, final), evaluation=evaluation)
-
-
-def make_results(out: Path) -> None:
-    """Write three seeds each of two methods, all of one tool."""
-    for seed in range(3):
-        make_cell(out, "gnn_ppo", seed, 2.0)
-        make_cell(out, "cma_rl", seed, 1.0)
 
 
 def claim(name: str, finding: Finding | None) -> Claim:
@@ -71,32 +44,6 @@ def claim(name: str, finding: Finding | None) -> Claim:
     return Claim(
         name, f"sentence of {name}", "section", Rule("kind", "number", "words", ("make {results}{profile}",), found)
     )
-
-
-def test_verify_prints_and_writes_a_row_for_each_claim(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    results, out = tmp_path / "runs", tmp_path / "claims"
-    make_results(results)
-    assert main(["verify", "--results", str(results), "--out", str(out)]) == 0
-    printed = capsys.readouterr().out.splitlines()
-    rows = {line.split()[1]: line for line in printed if line.split()[0] in VERDICTS}
-    assert set(rows) == {claim.name for claim in CLAIMS if set(claim.tasks) <= {"push"}}
-    assert (
-        " ".join(rows["final_return.push.cma_rl"].split()[:5]) == "supported final_return.push.cma_rl 1.00 [1.00, 1.00]"
-    )
-    assert rows["steps.push.cma_rl"].split()[2] == "0.50"
-    assert rows["tools_vary.push"].startswith("contradicted")
-    assert rows["final_return.push.cma_es"].startswith("undecided")
-    assert printed[-2:] == [str(out / "claims.json"), str(out / "claims.md")]
-
-    content = json.loads((out / "claims.json").read_text())
-    written = {row["name"]: row for row in content["claims"]}
-    assert set(written) == {claim.name for claim in CLAIMS}
-    assert {name for name, row in written.items() if row["verdict"] != NOT_ASKED} == set(rows)
-    assert written["final_return.push.cma_rl"]["value"] == pytest.approx(1.0)
-    assert written["final_return.push.cma_rl"]["verdict"] == "supported"
-    assert written["final_return.push.cma_es"]["value"] is None
-    page = (out / "claims.md").read_text()
-    assert {claim.name for claim in CLAIMS if claim.sentence in page} == set(rows)
 
 
 def test_missing_data_are_named_with_the_command_that_makes_them_alike(tmp_path: Path) -> None:
@@ -174,64 +121,3 @@ def test_names_of_claims_are_unique_and_commands_have_their_places() -> None:
     for entry in ALL_CLAIMS:
         assert entry.rule.needs
         assert all("{results}" in command for command in entry.rule.needs)
-
-
-def test_the_page_on_claims_tells_every_rule_in_the_same_words() -> None:
-    page = (ROOT / "docs" / "claims.md").read_text()
-    told = set(re.findall(r"^\| (.+) \| (.+) \| (.+) \|$", page, re.MULTILINE))
-    assert {(claim.rule.kind, claim.rule.statistic, claim.rule.words) for claim in CLAIMS} <= told
-
-
-@pytest.mark.reference
-@pytest.mark.skipif(not REFERENCE.exists(), reason="a source distribution leaves the results out")
-def test_the_shipped_results_decide_what_they_can() -> None:
-    rows = {row.claim.name: row for row in judge(CLAIMS, load_evidence(REFERENCE), "results/reference")}
-    frame = default_rows(load_results(REFERENCE))
-    last = frame.sort_values("env_steps").groupby(["task", "method", "seed"])["return_mean"].last()
-    means, seeds = last.groupby(["task", "method"]).mean(), last.groupby(["task", "method"]).size()
-    compared = [f"final_return.{task}.cma_rl" for task, method in means.index if method == "cma_rl"]
-    assert compared
-    for name in compared:
-        task, finding = name.split(".")[1], rows[name].finding
-        assert finding.value == pytest.approx(means[task, "gnn_ppo"] - means[task, "cma_rl"], abs=1e-9)
-        assert finding.n == f"{seeds[task, 'gnn_ppo']} and {seeds[task, 'cma_rl']} seeds"
-    decided = {name for name, row in rows.items() if not row.needs}
-    assert {f"no_single_tool.{table.stem}" for table in REFERENCE.glob("design_sensitivity/*.csv")} <= decided
-
-
-@pytest.mark.parametrize(
-    ("damage", "told"),
-    [
-        (lambda folder: (folder / "evaluation.csv").write_text("somebody,else\n1,2\n"), "lacks values of 'return'"),
-        (lambda folder: (folder / "evaluation.csv").write_text('a,b\n1,2,3\n"'), "cannot read a table"),
-        (lambda folder: (folder / "evaluation.csv").write_text(""), "cannot read a table"),
-    ],
-)
-def test_damaged_results_are_refused_in_a_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], damage: Any, told: str
-) -> None:
-    make_results(tmp_path)
-    damage(tmp_path / "push" / "gnn_ppo" / "default" / "seed-01")
-    assert main(["verify", "--results", str(tmp_path), "--out", str(tmp_path / "claims")]) == 2
-    error = capsys.readouterr().err
-    assert told in error
-    assert error.count("\n") == 1
-
-
-def test_other_bad_input_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "file").write_text("")
-    for results in (tmp_path / "nowhere", tmp_path):
-        assert main(["verify", "--results", str(results), "--out", str(tmp_path / "claims")]) == 2
-        assert str(results) in capsys.readouterr().err
-    make_results(tmp_path / "runs")
-    assert main(["verify", "--results", str(tmp_path / "runs"), "--out", str(tmp_path / "file" / "claims")]) == 2
-    assert "cannot write" in capsys.readouterr().err
-    with pytest.raises(UserError, match="nowhere"):
-        load_evidence(tmp_path / "nowhere")
-
-
-def test_unfinished_and_failed_cells_do_not_count(tmp_path: Path) -> None:
-    make_results(tmp_path)
-    make_cell(tmp_path, "gnn_ppo", 3, 99.0, status=FAILED)
-    make_cell(tmp_path, "gnn_ppo", 4, 99.0, status=RUNNING)
-    assert load_evidence(tmp_path).final_returns("push", "gnn_ppo").tolist() == [2.0, 2.0, 2.0]

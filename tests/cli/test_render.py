@@ -12,7 +12,7 @@ from codesign_bench.cli import main
     [
         (["--task", "push", "--out", "push.jpg"], "pictures end in .gif or .png"),
         (["--task", "pusch", "--out", "push.png"], "unknown task 'pusch'; choose from: push"),
-        (["--out", "push.png"], "give --task, or --policy"),
+        (["--out", "push.png"], "give --policy or --task"),
         (["--policy", "x", "--behaviour", "random", "--out", "push.png"], "either --policy or --behaviour"),
         (["--task", "push", "--episodes", "0", "--out", "push.png"], "--episodes must be at least 1"),
         (["--policy", "nowhere", "--out", "push.png"], "is not a cell folder"),

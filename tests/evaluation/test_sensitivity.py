@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codesign_bench.cli import main
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation import sensitivity
 from codesign_bench.evaluation.evaluate import evaluate
@@ -75,8 +74,3 @@ def test_the_figure_is_measured_when_asked_for_by_name_alone(tmp_path: Path) -> 
     draw_figures(["design_sensitivity"], runs, out, told.append)
     assert {path.suffix for path in out.glob("design_sensitivity.*")} == {".csv", ".pdf", ".png"}
     draw_figures([], runs, out, told.append)  # Now the results allow it.
-
-
-def test_plotting_without_results_says_how_to_make_some(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plot", "--results", str(tmp_path / "none"), "--out", str(tmp_path / "figures")]) == 2
-    assert "codesign-bench run --out" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""`plot --compare` draws other results over one's own: same colours, dashed, on the tasks that both have."""
+"""Compared curves are those of the same tasks: in their methods' colours, dashed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import pandas as pd
 import pytest
 
 from builders import rising, store_cell
-from codesign_bench.cli import main
 from codesign_bench.figures.comparison import with_compared
 from codesign_bench.registry import load_module
 from codesign_bench.storage.frames import load_results
@@ -50,20 +49,3 @@ def test_compared_curves_are_dashed_in_their_methods_colour(own: pd.DataFrame, r
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert len(labels) == 3
     assert labels[-1].endswith("from before (n=3)")
-
-
-def test_a_figure_without_curves_says_so(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["plot", "tradeoff", "--results", str(results), "--compare", str(results), "--out", str(tmp_path)]
-    assert main(arguments) == 2
-    assert "choose from: learning_curves" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("names", [[], ["learning_curves"]])
-def test_a_folder_that_is_not_there_is_an_error_whatever_is_drawn(
-    names: list[str], results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "figures"
-    arguments = ["plot", *names, "--results", str(results), "--compare", str(tmp_path / "no"), "--out", str(out)]
-    assert main(arguments) == 2
-    assert f"no results folder '{tmp_path / 'no'}'" in capsys.readouterr().err
-    assert not out.exists()

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 import torch
 
-from codesign_bench.learning.features import Features
 from codesign_bench.learning.networks import (
     MLP,
     GraphConvolution,
@@ -24,7 +23,7 @@ from codesign_bench.learning.networks import (
     adjacency_matrix,
     torch_generator,
 )
-from codesign_bench.task import ToolGraph, load_task
+from codesign_bench.task import ToolGraph
 from tolerances import DOUBLE, SINGLE, of_network, of_sum
 
 pytestmark = pytest.mark.numeric
@@ -184,27 +183,6 @@ def test_running_norm_clips_and_knows_the_bounds_before_the_first_batch() -> Non
     constant = RunningNorm([0.0], [1.0])
     constant.update(torch.full((4, 1), 3.0))
     assert constant(torch.tensor([[3.0]])).item() == 0.0
-
-
-def test_features_hand_each_node_its_own_design_parameters() -> None:
-    features = Features(load_task("push"))
-    layout = features.layout
-    observation = torch.arange(float(layout.size))[None]
-    start = layout.design.start
-    # Lengths are the parameters 0 to 2; the joints' angles, 3 and 4, belong to the links behind them.
-    expected = [[start, 0.0], [start + 1.0, start + 3.0], [start + 2.0, start + 4.0]]
-    assert features.nodes(observation)[:, 0].tolist() == expected
-    assert features.phase(observation)[0].tolist() == [layout.phase.start, layout.phase.start + 1.0]
-
-
-def test_no_network_sees_the_elapsed_time() -> None:
-    features = Features(load_task("push"))
-    norm = RunningNorm.over(*features.boxes)
-    early = torch.zeros(1, features.layout.size)
-    late = early.clone()
-    late[0, -1] = 1.0
-    assert torch.equal(features.flat(early, norm), features.flat(late, norm))
-    assert features.flat(early, norm).shape == (1, features.flat_size)
 
 
 def test_adjacency_is_symmetric_without_loops() -> None:

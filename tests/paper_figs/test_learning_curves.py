@@ -60,11 +60,6 @@ def line(axes: Axes, name: str) -> np.ndarray:
     return points[~np.isnan(points[:, 1])]
 
 
-def names(axes: Axes) -> set[str | None]:
-    """Return the names of all lines of a panel."""
-    return {found.get_gid() for found in axes.lines}
-
-
 def legend(figure: Figure) -> list[str]:
     """Return the entries of the figure's one legend."""
     (found,) = figure.legends
@@ -109,11 +104,6 @@ def test_the_legend_counts_seeds_and_starts_with_the_papers_methods() -> None:
     assert legend(learning_curves.draw(frame)) == ["gnn_ppo (n=3)", "cma_es (n=1)", "a_third_party (n=3)"]
 
 
-def test_the_legend_gives_the_range_of_seeds_over_tasks() -> None:
-    frame = pd.concat([three_seeds("push", "gnn_ppo"), cell("scoop", "gnn_ppo", 0, [0, 0, 0])])
-    assert legend(learning_curves.draw(frame)) == ["gnn_ppo (n=1-3)"]
-
-
 def test_a_label_column_names_the_methods() -> None:
     frame = three_seeds("push", "gnn_ppo").assign(label="Graph network")
     assert legend(learning_curves.draw(frame)) == ["Graph network (n=3)"]
@@ -139,34 +129,10 @@ def test_a_partial_sweep_is_dotted_where_seeds_are_missing() -> None:
     assert line(axes, "gnn_ppo (fewer seeds)")[:, 0].tolist() == [1000.0, 2000.0]
 
 
-def test_seeds_that_end_a_few_steps_apart_make_no_spike() -> None:
-    ends = (2000, 2004, 2009)
-    frame = pd.concat([cell("push", "gnn_ppo", seed, [0, 0, seed], steps=(0, 1000, ends[seed])) for seed in range(3)])
-    axes = panel(learning_curves.draw(frame), "push")
-    assert line(axes, "gnn_ppo")[-1, 0] == 2000.0
-    assert names(axes) == {"gnn_ppo"}
-
-
 def test_other_variants_are_left_out() -> None:
     frame = pd.concat([three_seeds("push", "gnn_ppo"), cell("scoop", "cma_es", 0, [9, 9, 9], variant="alpha-0.30")])
     table = learning_curves.data(frame)
     assert set(table["task"]) == {"push"}
-
-
-def test_a_methods_colour_does_not_depend_on_its_company() -> None:
-    alone = learning_curves.draw(three_seeds("push", "cma_rl"))
-    together = learning_curves.draw(pd.concat([three_seeds("push", name) for name in ("gnn_ppo", "x", "cma_rl")]))
-    colours = [
-        next(found.get_color() for found in panel(figure, "push").lines if found.get_gid() == "cma_rl")
-        for figure in (alone, together)
-    ]
-    assert colours[0] == colours[1]
-
-
-def test_many_third_party_methods_can_be_told_apart() -> None:
-    frame = pd.concat([cell("push", f"method_{index}", 0, [0, 0, 0]) for index in range(9)])
-    lines = panel(learning_curves.draw(frame), "push").lines
-    assert len({(str(found.get_color()), str(found.get_linestyle())) for found in lines}) == 9
 
 
 def test_missing_columns_are_named() -> None:

@@ -1,0 +1,56 @@
+"""`codesign-bench verify`: a row per claim, printed and written, and bad input answered in a line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from codesign_bench.claims.evidence import load_evidence
+from codesign_bench.claims.finding import NOT_ASKED, VERDICTS
+from codesign_bench.cli import main
+from codesign_bench.errors import UserError
+from codesign_bench.study.study import load_study
+from evidence import make_results
+
+PAPER = load_study("corl2023")
+CLAIMS = PAPER.claims()
+
+
+def test_verify_prints_and_writes_a_row_for_each_claim(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    results, out = tmp_path / "runs", tmp_path / "claims"
+    make_results(results)
+    assert main(["verify", "--results", str(results), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    rows = {line.split()[1]: line for line in printed if line.split()[0] in VERDICTS}
+    assert set(rows) == {claim.name for claim in CLAIMS if set(claim.tasks) <= {"push"}}
+    assert (
+        " ".join(rows["final_return.push.cma_rl"].split()[:5]) == "supported final_return.push.cma_rl 1.00 [1.00, 1.00]"
+    )
+    assert rows["steps.push.cma_rl"].split()[2] == "0.50"
+    assert rows["tools_vary.push"].startswith("contradicted")
+    assert rows["final_return.push.cma_es"].startswith("undecided")
+    assert printed[-2:] == [str(out / "claims.json"), str(out / "claims.md")]
+
+    content = json.loads((out / "claims.json").read_text())
+    written = {row["name"]: row for row in content["claims"]}
+    assert set(written) == {claim.name for claim in CLAIMS}
+    assert {name for name, row in written.items() if row["verdict"] != NOT_ASKED} == set(rows)
+    assert written["final_return.push.cma_rl"]["value"] == pytest.approx(1.0)
+    assert written["final_return.push.cma_rl"]["verdict"] == "supported"
+    assert written["final_return.push.cma_es"]["value"] is None
+    page = (out / "claims.md").read_text()
+    assert {claim.name for claim in CLAIMS if claim.sentence in page} == set(rows)
+
+
+def test_other_bad_input_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    for results in (tmp_path / "nowhere", tmp_path):
+        assert main(["verify", "--results", str(results), "--out", str(tmp_path / "claims")]) == 2
+        assert str(results) in capsys.readouterr().err
+    make_results(tmp_path / "runs")
+    assert main(["verify", "--results", str(tmp_path / "runs"), "--out", str(tmp_path / "file" / "claims")]) == 2
+    assert "cannot write" in capsys.readouterr().err
+    with pytest.raises(UserError, match="nowhere"):
+        load_evidence(tmp_path / "nowhere")

@@ -1,0 +1,63 @@
+"""Where figures get their numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from builders import rising, store_cell
+from codesign_bench.errors import UserError
+from codesign_bench.figures.source import (
+    Request,
+    curves,
+    design_sensitivity,
+    evaluations,
+    tasks_in,
+    timing,
+    trials_on_an_arm,
+)
+from codesign_bench.storage.records import RUNNING
+
+
+def test_curves_are_those_of_all_cells_and_evaluations_those_of_finished_ones(tmp_path: Path) -> None:
+    store_cell(tmp_path, curve=rising(0.0, 1.0), evaluation=[{"return": 1.0}, {"return": 3.0}])
+    store_cell(tmp_path, seed=1, status=RUNNING, curve=rising(0.0, 5.0), evaluation=[{"return": 9.0}])
+    assert curves(Request(tmp_path))["return_mean"].tolist() == [0.0, 1.0, 0.0, 5.0]
+    assert evaluations(Request(tmp_path))["return"].tolist() == [1.0, 3.0]
+
+
+def test_tasks_are_those_of_the_cells_each_once(tmp_path: Path) -> None:
+    for task, seed in (("scoop", 0), ("push", 0), ("push", 1)):
+        store_cell(tmp_path, task=task, seed=seed, status=RUNNING)
+    assert sorted(tasks_in(tmp_path)) == ["push", "scoop"]
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(UserError, match="name the figure to draw it without any"):
+        tasks_in(tmp_path / "empty")
+
+
+def test_trials_are_read_from_beside_the_cells(tmp_path: Path) -> None:
+    for task in ("lift_cup", "fetch_cube"):
+        path = tmp_path / "deployment" / task / "protocol.csv"
+        path.parent.mkdir(parents=True)
+        pd.DataFrame({"task": [task], "success": [1]}).to_csv(path, index=False)
+    assert trials_on_an_arm(Request(tmp_path))["task"].tolist() == ["fetch_cube", "lift_cup"]
+
+
+def test_what_was_measured_is_read_and_nothing_is_measured_for_a_figure_that_nobody_named(tmp_path: Path) -> None:
+    told: list[str] = []
+    with pytest.raises(UserError, match="measure it with: codesign-bench plot design_sensitivity"):
+        design_sensitivity(Request(tmp_path, told.append))
+    assert (told, list(tmp_path.iterdir())) == ([], [])
+    path = tmp_path / "design_sensitivity" / "push.csv"
+    path.parent.mkdir()
+    pd.DataFrame({"task": ["push"], "return": [2.0]}).to_csv(path, index=False)
+    assert design_sensitivity(Request(tmp_path))["return"].tolist() == [2.0]
+
+
+@pytest.mark.parametrize("source", [curves, evaluations, design_sensitivity, timing, trials_on_an_arm])
+def test_a_source_without_data_says_how_to_make_some(source: object, tmp_path: Path) -> None:
+    assert callable(source)
+    with pytest.raises(UserError, match="codesign-bench "):
+        source(Request(tmp_path))

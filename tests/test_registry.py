@@ -1,0 +1,84 @@
+"""Members are found by their file's name, as entry points, or because they were registered."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import pytest
+
+from codesign_bench import registry
+from codesign_bench.errors import UserError
+from codesign_bench.task import Task
+
+pytestmark = pytest.mark.usefixtures("toy")
+
+
+class Base:
+    """What a member has to be."""
+
+
+def module_with(**members: type) -> ModuleType:
+    """Return a module named `made_here` that defines these classes."""
+    module = ModuleType("made_here")
+    for name, member in members.items():
+        member.__module__ = module.__name__
+        setattr(module, name, member)
+    return module
+
+
+@pytest.mark.parametrize("group", registry.KINDS)
+def test_built_in_names_are_those_of_the_files_and_the_presented_come_first(group: str) -> None:
+    presented, built_in = registry.presented(group), registry.built_in(group)
+    assert built_in[: len(presented)] == presented
+    assert list(built_in[len(presented) :]) == sorted(built_in[len(presented) :])
+    assert not any(name.startswith("_") for name in built_in)
+    assert registry.names(group)[: len(built_in)] == built_in
+
+
+def test_what_is_registered_comes_last_and_can_be_loaded() -> None:
+    assert registry.names("tasks")[-1] == "toy_reach"
+    assert registry.load("tasks", "toy_reach", Task)().name == "toy_reach"
+    assert registry.load("tasks", "push", Task)().name == "push"
+
+
+def test_names_are_put_into_the_order_of_listings_each_once_and_unknown_ones_last() -> None:
+    found = registry.in_order("tasks", ["zebra", "toy_reach", "scoop", "apple", "push", "scoop"])
+    assert found == ["push", "scoop", "toy_reach", "apple", "zebra"]
+
+
+@pytest.mark.parametrize(("group", "kind"), registry.KINDS.items())
+def test_an_unknown_name_is_answered_with_those_there_are(group: str, kind: str) -> None:
+    with pytest.raises(UserError, match=f"unknown {kind} 'nothing'; choose from: ") as told:
+        registry.load(group, "nothing", Base)
+    assert all(name in str(told.value) for name in registry.names(group))
+    with pytest.raises(UserError, match=f"unknown {kind} 'nothing'"):
+        registry.load_module(group, "nothing")
+
+
+def test_a_figure_or_a_study_must_be_a_module() -> None:
+    registry.register("paper_figs", "a_class", lambda: Base)
+    with pytest.raises(TypeError, match="the figure 'a_class' must be a module, not type"):
+        registry.load_module("paper_figs", "a_class")
+    module = ModuleType("a_module")
+    registry.register("paper_figs", "a_module", lambda: module)
+    assert registry.load_module("paper_figs", "a_module") is module
+
+
+def test_a_study_without_its_attribute_is_told() -> None:
+    module = ModuleType("my_study")
+    registry.register("studies", "my_study", lambda: module)
+    with pytest.raises(TypeError, match="my_study is registered as a study and must define STUDY"):
+        registry.load_attribute("studies", "my_study", "STUDY")
+    module.STUDY = "what it is"  # type: ignore[attr-defined]
+    assert registry.load_attribute("studies", "my_study", "STUDY") == "what it is"
+
+
+def test_a_file_has_one_public_class_of_its_kind() -> None:
+    public, private = type("Mine", (Base,), {}), type("_Help", (Base,), {})
+    module = module_with(Mine=public, _Help=private)
+    module.Imported = type("Imported", (Base,), {"__module__": "elsewhere"})  # type: ignore[attr-defined]
+    assert registry.single_subclass(module, Base) is public
+    with pytest.raises(TypeError, match="made_here must define one public Base, not 0"):
+        registry.single_subclass(module_with(_Help=private), Base)
+    with pytest.raises(TypeError, match="made_here must define one public Base, not 2"):
+        registry.single_subclass(module_with(Mine=public, Other=type("Other", (Base,), {})), Base)

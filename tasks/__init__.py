@@ -1,4 +1,4 @@
-"""One file, one task: its physics, its reward, its goal space. Files with an underscore hold what several share."""
+"""One file per task, with its physics, reward and goal space. Files with an underscore are shared by several tasks."""
 
 ORDER = ("push", "catch_balls", "scoop", "fetch_cube", "lift_cup", "scoop_3d")
 """The order in listings and figures."""

@@ -1,6 +1,6 @@
-"""What the 3D tasks share: a simulator with one PyBullet world per slot, and a tool of boxes that a carrier moves.
+"""Shared by the 3D tasks: a simulator with one PyBullet world per slot, and a tool of boxes moved by a carrier.
 
-Shapes: `B` slots, `b` the slots a call names, `N` moving bodies, `K` boxes of a tool, `A` axes of the held point.
+Shapes: `B` slots, `b` the slots of a call, `N` moving bodies, `K` boxes of a tool, `A` axes of the held point.
 Lengths are in m, angles in rad, times in s, masses in kg, forces in N. Rotations are quaternions (x, y, z, w).
 """
 
@@ -23,19 +23,19 @@ from ._carriers import CARRIER_SCENE, LEVEL, Carrier, Gantry, HeldTool, ToolShap
 from ._scene import COLOURS, PICTURE_PIXELS, Clock
 
 GRAVITY: Annotated[float, Given("m/s^2", "the Earth's")] = 9.81
-"""Of the scene."""
+"""Gravitational acceleration of the scene."""
 PUSH_FORCE: Annotated[float, Given("N", OURS)] = 50.0
 """Largest force of a sliding joint of the gantry."""
 TURN_TORQUE = 10.0
 """Largest torque of a turning joint of the gantry, N m (ours)."""
 TOOL_MASS: Annotated[float, Given("kg", OURS)] = 0.5
-"""Of the tool."""
+"""Mass of the tool."""
 TOOL_FRICTION: Annotated[float, Given("1", OURS)] = 1.0
-"""Of the tool's surface; PyBullet multiplies the frictions of the two bodies of a contact."""
+"""Friction of the tool's surface; PyBullet multiplies the friction coefficients of the two bodies in contact."""
 SOLVER_ITERATIONS: Annotated[int, Given("1", "PyBullet's own")] = 50
-"""Of the contact solver in every physics step."""
+"""Iterations of the contact solver in every physics step."""
 BULLET_SCENE = {**CARRIER_SCENE, **constants(__name__)}
-"""Constants of the tasks in PyBullet, unless they have others of the same name."""
+"""Constants of the tasks in PyBullet; a task may override them by name."""
 MAX_SLOTS = 28
 """For `Task.max_slots`: an idle world takes over 20 MB, and a cell should stay below 1 GB (ours)."""
 Triple: TypeAlias = tuple[float, float, float]
@@ -46,12 +46,12 @@ PICTURE_SHAPE = (3 * PICTURE_PIXELS // 4, PICTURE_PIXELS)
 """Height and width of a picture in pixels."""
 
 _idle_worlds: list[int] = []
-"""Connections whose simulator is gone: making one takes tens of ms and 28 MB, so the next simulator takes them over."""
+"""Connections of deleted simulators, reused by the next one: a new connection costs tens of ms and 28 MB."""
 
 
 @dataclass(frozen=True)
 class Boxes:
-    """The boxes that make up `b` tools, in the frame of the held point."""
+    """The boxes of `b` tools, in the frame of the held point."""
 
     half_extents: Floats
     """(b, K, 3)."""
@@ -62,14 +62,14 @@ class Boxes:
 
 
 def box_parts(boxes: Boxes) -> tuple[BoxPart, ...]:
-    """Return the parts of the first of the tools made up of `boxes`."""
+    """Return the parts of the first tool in `boxes`."""
     entries = zip(boxes.half_extents[0].tolist(), boxes.centres[0].tolist(), boxes.rotations[0].tolist(), strict=True)
     return tuple(BoxPart(tuple(half), tuple(centre), tuple(rotation)) for half, centre, rotation in entries)
 
 
 @dataclass(frozen=True)
 class Camera:
-    """Where pictures of a scene are taken from."""
+    """The viewpoint of pictures of a scene."""
 
     eye: tuple[float, float, float]
     target: tuple[float, float, float]
@@ -77,7 +77,7 @@ class Camera:
     field_of_view: float = 45.0
     """Vertical, degrees."""
     near: float = 0.1
-    """What is nearer than this is not drawn: a roof can be left out of a picture from above."""
+    """Nearer objects are not drawn, e.g. to leave out a roof in a picture from above."""
     far: float = 10.0
 
 
@@ -101,28 +101,28 @@ def rotation_matrices(rotations: Floats) -> Floats:
 
 
 class BulletSimulator(DeployedSimulator):
-    """One PyBullet world per slot, emptied before every episode so that nothing of the last one can reach the next.
+    """One PyBullet world per slot, emptied before every episode so that no state carries over to the next.
 
-    The robot is a `Gantry` unless another carrier is given, as deployment does.
+    The robot is a `Gantry` unless another carrier is given, as in deployment.
 
     A subclass fills a world in `build_scene`, calls `restart` from `begin`, `add_tools` from `build`, and
-    `drive`, `advance`, `read_tools` and `read_bodies` from `step`. Worlds are taken up at their first use and handed on
-    when the simulator is gone. Whatever a subclass sets in a world must be set again after `restart`; parameters of
-    the engine itself are set nowhere but here.
+    `drive`, `advance`, `read_tools` and `read_bodies` from `step`. Worlds are acquired on first use and reused after
+    the simulator is deleted. `restart` resets everything that a subclass has set in a world; parameters of the engine
+    are set only here.
     """
 
     camera: Camera
     room: ClassVar[tuple[tuple[float, float], ...]]
-    """Lowest and highest x, y and z where the centres of moving bodies may be, m."""
+    """Lowest and highest x, y and z of the centres of moving bodies, m."""
     turning_axes: ClassVar[tuple[int, ...]] = ()
-    """0, 1, 2 for x, y, z: the axes that the tool turns about, behind the three sliding joints."""
+    """Axes that the tool turns about, after the three sliding joints; 0, 1, 2 for x, y, z."""
     push_force: ClassVar[float] = PUSH_FORCE
     turn_torque: ClassVar[float] = TURN_TORQUE
     tool_mass: ClassVar[float] = TOOL_MASS
     tool_friction: ClassVar[float] = TOOL_FRICTION
     solver_iterations: ClassVar[int] = SOLVER_ITERATIONS
     contact_correction: ClassVar[float | None] = None
-    """Share of an overlap that a physics step takes away; None: PyBullet's own."""
+    """Fraction of an overlap that a physics step removes; None: PyBullet's default."""
 
     def __init__(
         self, num_slots: int, state_size: int, num_bodies: int, clock: Clock, carrier: Carrier | None = None
@@ -131,21 +131,21 @@ class BulletSimulator(DeployedSimulator):
         self.clock = clock
         self.worlds: list[int | None] = [None] * num_slots
         self.moving: list[list[int]] = [[] for _ in range(num_slots)]
-        """The moving bodies of every world, tool excepted, as `build_scene` returned them."""
+        """The moving bodies of every world except the tool, as `build_scene` returned them."""
         self.held: list[HeldTool | None] = [None] * num_slots
         self.tools: list[int | None] = [None] * num_slots
-        """The bodies that hold the tools, these included."""
+        """The bodies that hold the tools and include them as links."""
         self.bodies: Floats = np.zeros((num_slots, num_bodies, SPIN.stop))
         """(B, N, 13): `PLACE`, `ROTATION`, `VELOCITY` and `SPIN` of the moving bodies."""
         self.pose: Floats = np.zeros((num_slots, 3 + len(self.turning_axes)))
         """(B, A): pose of the held point."""
         self.carrier: Carrier = carrier or Gantry(self.turning_axes, self.push_force, self.turn_torque)
-        """What holds the tools of all slots."""
+        """Holds the tools of all slots."""
         weakref.finalize(self, _hand_on, self.worlds)
 
     @abstractmethod
     def build_scene(self, slot: int) -> list[int]:
-        """Add everything but the tool to the empty world of `slot`; return the bodies that move."""
+        """Add everything except the tool to the empty world of `slot`; return the moving bodies."""
 
     def restart(self, slots: Slots) -> None:
         """Empty the worlds of `slots` and build their scenes."""
@@ -154,6 +154,8 @@ class BulletSimulator(DeployedSimulator):
             if world is None:
                 world = self.worlds[slot] = _idle_worlds.pop() if _idle_worlds else pybullet.connect(pybullet.DIRECT)
             pybullet.resetSimulation(physicsClientId=world)
+            # Contact pairs are sorted: the solver's result depends on their order, which would otherwise depend on what
+            # was played in this world before.
             pybullet.setPhysicsEngineParameter(
                 fixedTimeStep=self.clock.period,
                 numSolverIterations=self.solver_iterations,
@@ -181,6 +183,7 @@ class BulletSimulator(DeployedSimulator):
         """Add a box, fixed if it has no mass, to the world of `slot`; return its body."""
         world = self.worlds[slot]
         shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half_extents, physicsClientId=world)
+        # Damping is PyBullet's default, not physics: it would slow falling and sliding bodies besides friction.
         body: int = pybullet.createMultiBody(mass, shape, -1, position, rotation, physicsClientId=world)
         pybullet.changeDynamics(
             body, -1, lateralFriction=friction, linearDamping=0.0, angularDamping=0.0, physicsClientId=world
@@ -200,17 +203,17 @@ class BulletSimulator(DeployedSimulator):
         friction: float = 1.0,
         colour: str = COLOURS["object"],
     ) -> int:
-        """Add a loose body made of level boxes to the world of `slot`; return it.
+        """Add a loose body of axis-aligned boxes to the world of `slot`; return it.
 
         Args:
-            slot: whose world.
-            half_extents: of its boxes, (K, 3).
-            centres: of its boxes, from its centre of mass, (K, 3).
-            position: of its centre of mass.
-            mass: of the whole.
-            inertia: about x, y and z, the principal axes, kg m^2.
-            friction: of all boxes.
-            colour: of all boxes, "#rrggbb".
+            slot: the slot of the world.
+            half_extents: half extents of the boxes, (K, 3).
+            centres: centres of the boxes relative to the centre of mass, (K, 3).
+            position: position of the centre of mass.
+            mass: total mass.
+            inertia: moments of inertia about x, y and z, the principal axes, kg m^2.
+            friction: friction of all boxes.
+            colour: colour of all boxes, "#rrggbb".
         """
         world = self.worlds[slot]
         shape = pybullet.createCollisionShapeArray(
@@ -219,14 +222,14 @@ class BulletSimulator(DeployedSimulator):
             collisionFramePositions=centres,
             physicsClientId=world,
         )
-        # A body without joints is simulated faster as a rigid body of its own than as a tree of one link.
+        # A body without joints is simulated faster as a plain rigid body than as a multibody with one link.
         body: int = pybullet.createMultiBody(
             mass, shape, -1, position, useMaximalCoordinates=True, physicsClientId=world
         )
         pybullet.changeDynamics(
             body,
             -1,
-            mass=mass,  # Without it, setting the inertia sets the mass to 0.
+            mass=mass,  # without it, setting the inertia sets the mass to 0
             localInertiaDiagonal=inertia,
             lateralFriction=friction,
             linearDamping=0.0,
@@ -237,11 +240,11 @@ class BulletSimulator(DeployedSimulator):
         return body
 
     def paint(self, slot: int, body: int, colour: str, link: int = -1) -> None:
-        """Draw a body, or one of its links, in `colour` ("#rrggbb") from now on."""
+        """Set the colour ("#rrggbb") of a body or of one of its links in pictures."""
         pybullet.changeVisualShape(body, link, rgbaColor=_rgba(colour), physicsClientId=self.worlds[slot])
 
     def hide(self, slot: int, body: int) -> None:
-        """Leave a body of one shape out of pictures."""
+        """Make a body of one shape invisible in pictures."""
         pybullet.changeVisualShape(body, -1, rgbaColor=(1.0, 1.0, 1.0, 0.0), physicsClientId=self.worlds[slot])
 
     def add_tools(self, slots: Slots, boxes: Boxes, poses: Floats) -> None:
@@ -255,13 +258,13 @@ class BulletSimulator(DeployedSimulator):
         self.pose[slots] = poses
 
     def drive(self, slots: Slots, displacements: Floats) -> None:
-        """Set the motors of `slots` such that the held points make `displacements` (b, A) in one control step."""
+        """Set the motors of `slots` to move the held points by `displacements` (b, A) in one control step."""
         velocities = (displacements / self.clock.control_period).tolist()
         for slot, velocity in zip(slots.tolist(), velocities, strict=True):
             self._held(slot).drive(velocity)
 
     def advance(self, slots: Slots) -> None:
-        """Make PyBullet's steps of one control step in the worlds of `slots`."""
+        """Take the physics steps of one control step in the worlds of `slots`."""
         steps = self.clock.steps
         for slot in slots.tolist():
             held, world = self.held[slot], self.worlds[slot]
@@ -271,12 +274,12 @@ class BulletSimulator(DeployedSimulator):
                 held.advance(steps)
 
     def read_tools(self, slots: Slots) -> Floats:
-        """Read the poses of the held points of `slots` into `pose`; return them, (b, A)."""
+        """Read the poses of the held points of `slots` into `pose` and return them, (b, A)."""
         self.pose[slots] = [self._held(slot).read() for slot in slots.tolist()]
         return self.pose[slots]
 
     def read_bodies(self, slots: Slots) -> Floats:
-        """Read places and velocities of the moving bodies of `slots` into `bodies`; return them, (b, N, 13)."""
+        """Read positions and velocities of the moving bodies of `slots` into `bodies` and return them, (b, N, 13)."""
         place, motion = pybullet.getBasePositionAndOrientation, pybullet.getBaseVelocity
         values: list[float] = []
         for slot in slots.tolist():
@@ -288,7 +291,7 @@ class BulletSimulator(DeployedSimulator):
         return self.bodies[slots]
 
     def perturb(self, slot: int, friction: float, mass: float) -> None:
-        """Multiply friction and mass, inertia with it, of the moving bodies in `slot`."""
+        """Multiply friction and mass (with the inertia) of the moving bodies in `slot`."""
         world = self.worlds[slot]
         for body in self.moving[slot]:
             own_mass, own_friction, inertia, *_ = pybullet.getDynamicsInfo(body, -1, physicsClientId=world)
@@ -302,7 +305,7 @@ class BulletSimulator(DeployedSimulator):
             )
 
     def arm_report(self, slot: int) -> ArmReport:
-        """Return what has happened to the arm in `slot` since `build`; nothing ever happens to the gantry."""
+        """Return the report on the arm in `slot` since `build`; that of the gantry is always empty."""
         return self._held(slot).report
 
     def inspect(self, slot: int) -> Physics:
@@ -310,7 +313,7 @@ class BulletSimulator(DeployedSimulator):
         world = self.worlds[slot]
         loose = {*self.moving[slot], self._tool(slot)}
         listed = {pybullet.getBodyUniqueId(index, world) for index in range(pybullet.getNumBodies(world))}
-        bodies = sorted(listed | loose)  # Of bodies that were made in one go, PyBullet lists only the last.
+        bodies = sorted(listed | loose)  # of bodies created in one call, PyBullet lists only the last
         points = (
             point
             for first, second in combinations(bodies, 2)
@@ -326,9 +329,9 @@ class BulletSimulator(DeployedSimulator):
         )
 
     def tool_shapes(self, slot: int) -> tuple[BoxPart, ...]:
-        """Return the boxes of the tool's link, a gripper's handle included."""
+        """Return the boxes of the tool's link, with a gripper's handle if there is one."""
         held, world = self._held(slot), self.worlds[slot]
-        # PyBullet tells places from the centre of mass, and that from the link's own frame.
+        # PyBullet gives the shapes' positions relative to the centre of mass, and that relative to the link's frame.
         centre = np.array(pybullet.getDynamicsInfo(held.body, held.tool_link, physicsClientId=world)[3])
         shapes = pybullet.getCollisionShapeData(held.body, held.tool_link, physicsClientId=world)
         return tuple(
@@ -337,7 +340,7 @@ class BulletSimulator(DeployedSimulator):
         )
 
     def render(self, slot: int) -> Frame:
-        """Return a picture by PyBullet's own software renderer, with what the task adds in `mark`."""
+        """Return a picture from PyBullet's software renderer, with the marks that the task adds in `mark`."""
         camera, (height, width) = self.camera, PICTURE_SHAPE
         view = pybullet.computeViewMatrix(camera.eye, camera.target, camera.up)
         projection = pybullet.computeProjectionMatrixFOV(camera.field_of_view, width / height, camera.near, camera.far)
@@ -356,7 +359,7 @@ class BulletSimulator(DeployedSimulator):
         return marks.frame()
 
     def mark(self, slot: int, marks: Marks) -> None:
-        """Draw what is no body, above the bodies: a goal, a line. Nothing by default."""
+        """Draw marks that are not bodies, e.g. a goal or a line, on top of the bodies. Nothing by default."""
 
     def _held(self, slot: int) -> HeldTool:
         held = self.held[slot]
@@ -370,7 +373,7 @@ class BulletSimulator(DeployedSimulator):
 
 
 class Marks:
-    """Lines and dots on a picture of a scene, at places in the scene."""
+    """Lines and dots on a picture of a scene, at positions in the scene."""
 
     def __init__(self, pixels: Frame, to_clip: Floats) -> None:
         self._image = Image.fromarray(pixels)
@@ -391,6 +394,8 @@ class Marks:
         return np.array(self._image)
 
     def _at(self, points: Floats) -> Floats:
+        # Homogeneous coordinates times the transposed matrices of OpenGL: after division by the last coordinate, the
+        # visible part is [-1, 1], with y upwards, whereas rows of pixels count downwards.
         clip = np.pad(points, ((0, 0), (0, 1)), constant_values=1.0) @ self._to_clip
         shares = 0.5 + 0.5 * clip[:, :2] / clip[:, 3:]
         place: Floats = np.array(self._image.size) * np.stack([shares[:, 0], 1.0 - shares[:, 1]], axis=1)
@@ -398,7 +403,7 @@ class Marks:
 
 
 def _hand_on(worlds: list[int | None]) -> None:
-    """Keep the connections of a simulator that is gone for the next one."""
+    """Keep the connections of a deleted simulator for the next one."""
     _idle_worlds.extend(world for world in worlds if world is not None)
 
 

@@ -1,4 +1,4 @@
-"""What holds a tool in a PyBullet world and moves it: the gantry of training; `_panda.py` has an arm.
+"""Carriers hold and move a tool in a PyBullet world: here the gantry used in training, in `_panda.py` an arm.
 
 Shapes: `K` boxes of a tool, `A` axes of the held point.
 """
@@ -22,9 +22,9 @@ except ModuleNotFoundError as error:
     raise UserError("3D tasks need pybullet (it has wheels for Python 3.10 and 3.11): pip install pybullet") from error
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)
-"""The rotation that turns nothing."""
+"""The identity rotation."""
 CARRIAGE_MASS: Annotated[float, Given("kg", OURS)] = 0.1
-"""Of each moving part of the gantry but the last, which is the tool."""
+"""Mass of each moving part of the gantry except the last, which is the tool."""
 CARRIER_SCENE = constants(__name__)
 
 
@@ -44,16 +44,16 @@ class ToolShape:
 
 
 class HeldTool(ABC):
-    """A tool in a world, and what holds it there."""
+    """A tool in a world, and the robot that holds it."""
 
     body: int
-    """PyBullet's number of the body of which the tool is a link."""
+    """PyBullet's index of the body that contains the tool as a link."""
     tool_link: int
-    """Number of that link."""
+    """Index of this link."""
 
     def __init__(self) -> None:
         self.report = ArmReport()
-        """What has happened to the robot so far."""
+        """Events of the robot so far."""
 
     @abstractmethod
     def drive(self, velocity: Sequence[float]) -> None:
@@ -61,7 +61,7 @@ class HeldTool(ABC):
 
     @abstractmethod
     def advance(self, steps: int) -> None:
-        """Make so many physics steps."""
+        """Take `steps` physics steps."""
 
     @abstractmethod
     def read(self) -> list[float]:
@@ -77,17 +77,17 @@ class Carrier(ABC):
 
 
 def run(world: int | None, steps: int) -> None:
-    """Make so many physics steps in a world."""
+    """Take `steps` physics steps in a world."""
     step = pybullet.stepSimulation
     for _ in range(steps):
         step(world)
 
 
 class Gantry(Carrier):
-    """Sliding joints along x, y and z, then turning joints, and behind them the tool as one rigid shape.
+    """Sliding joints along x, y and z, then turning joints, and at their end the tool as one rigid shape.
 
-    Its joint positions are the pose of the held point. Motors hold it at a commanded velocity with limited force, so a
-    tool that is blocked stops instead of pressing through.
+    Its joint positions are the pose of the held point. Motors track a commanded velocity with limited force, so a
+    blocked tool stops instead of pressing through.
     """
 
     def __init__(self, turning_axes: Sequence[int], push_force: float, turn_torque: float) -> None:
@@ -103,6 +103,8 @@ class Gantry(Carrier):
             collisionFrameOrientations=tool.rotations,
             physicsClientId=world,
         )
+        # A chain of links, each with one joint and no offset; only the last has a shape. Joint positions are then the
+        # pose of the held point, and each axis has its own motor with a known largest force.
         count = len(self.forces)
         body: int = pybullet.createMultiBody(
             0.0,
@@ -136,7 +138,7 @@ class Gantry(Carrier):
 
 
 class _OnGantry(HeldTool):
-    """A tool behind the joints of a gantry."""
+    """A tool at the end of a gantry."""
 
     def __init__(self, world: int | None, body: int, forces: list[float]) -> None:
         super().__init__()
@@ -156,9 +158,9 @@ class _OnGantry(HeldTool):
         )
 
     def advance(self, steps: int) -> None:
-        """Make so many physics steps."""
+        """Take `steps` physics steps."""
         run(self.world, steps)
 
     def read(self) -> list[float]:
-        """Return the joints' positions."""
+        """Return the joint positions."""
         return [joint[0] for joint in pybullet.getJointStates(self.body, self._axes, self.world)]

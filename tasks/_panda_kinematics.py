@@ -1,7 +1,7 @@
-"""Where the Franka Panda's hand is for given joint angles, and the other way round; pure numbers, no simulator.
+"""Forward and inverse kinematics of the Franka Panda's hand, without a simulator.
 
-Shapes: `J` = 7 joints. Lengths are in m, angles in rad; a frame is a (4, 4) matrix from its own to the base's
-coordinates.
+Shapes: `J` = 7 joints. Lengths are in m, angles in rad; a frame is a (4, 4) matrix that maps its own coordinates to the
+base's.
 """
 
 from __future__ import annotations
@@ -23,30 +23,31 @@ JOINT_PLACES = np.array(
         (0.088, 0.0, 0.0, 0.5 * np.pi),
     ]
 )
-"""(J, 4): place of each joint in the frame of the link before, m, and that frame's turn about x, rad (URDF)."""
+"""(J, 4): position of each joint in the previous link's frame, m, and rotation about its x axis, rad (URDF)."""
 HAND_PLACE, HAND_TURN = 0.107, -0.25 * np.pi
-"""Of the hand's frame in that of the last link: along z, m, and about z, rad (URDF)."""
+"""The hand's frame in the last link's frame: offset along z, m, and rotation about z, rad (URDF)."""
 LOWEST = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
 HIGHEST = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
-"""Of the joints, rad (Franka's data sheet; the URDF's soft limits)."""
+"""Joint limits, rad (Franka's data sheet; the URDF's soft limits)."""
 FASTEST = np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61])
-"""Of the joints, rad/s (data sheet and URDF)."""
+"""Joint speed limits, rad/s (data sheet and URDF)."""
 STRONGEST = np.array([87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])
-"""Of the joints, N m (data sheet and URDF)."""
+"""Joint torque limits, N m (data sheet and URDF)."""
 READY = np.array([0.0, -0.25 * np.pi, 0.0, -0.75 * np.pi, 0.0, 0.5 * np.pi, 0.25 * np.pi])
-"""Franka's own posture of rest, rad."""
+"""Franka's posture of rest, rad."""
 
 LIMIT_MARGIN = 0.01
 """Postures stay this far inside the joints' limits, rad (ours)."""
 PLACE_TOLERANCE, TURN_TOLERANCE = 1e-4, 1e-3
-"""A frame this near to the wanted one is reached, m and rad (ours)."""
+"""A frame counts as reached within these errors, m and rad (ours)."""
 MOST_ITERATIONS = 40
 LEAST_DAMPING = 1e-6
-"""Of the least squares, added to the squared error, so that steps shorten far from the aim alone (ours)."""
+"""Smallest damping of the least squares; the squared error is added, so that only steps far from the target are short
+(ours)."""
 LONGEST_STEP = 0.3
-"""Of a joint in one iteration, rad (ours)."""
+"""Largest step of a joint in one iteration, rad (ours)."""
 REST_PULL = 0.02
-"""Share of the way to the posture of rest that the free joint goes in each iteration (ours)."""
+"""Fraction of the way to the posture of rest that the redundant joint moves in each iteration (ours)."""
 
 
 @dataclass(frozen=True)
@@ -58,13 +59,13 @@ class Posture:
     place_error: float
     """Distance between the hand's frame and the wanted one, m."""
     turn_error: float
-    """Angle between them, rad."""
+    """Angle between the two frames, rad."""
     at_limit: Booleans
-    """(J,) which joints stand at their limits."""
+    """(J,) which joints are at their limits."""
 
     @property
     def reached(self) -> bool:
-        """Whether the hand is where it should be."""
+        """Whether the hand is at the wanted frame, within tolerance."""
         return self.place_error < PLACE_TOLERANCE and self.turn_error < TURN_TOLERANCE
 
 
@@ -74,7 +75,7 @@ def hand_frame(angles: Floats) -> Floats:
 
 
 def joint_frames(angles: Floats) -> list[Floats]:
-    """Return the frames of the seven joints, turned by their angles (J,), and of the hand."""
+    """Return the frames of the seven joints, rotated by their angles (J,), and of the hand."""
     frames, frame = [], np.eye(4)
     for (x, y, z, turn), angle in zip(JOINT_PLACES.tolist(), angles.tolist(), strict=True):
         frame = frame @ _place_and_turns(x, y, z, turn, angle)
@@ -87,6 +88,7 @@ def jacobian(frames: list[Floats]) -> Floats:
     result = np.empty((6, len(LOWEST)))
     tip = frames[-1][:3, 3]
     for joint, frame in enumerate(frames[:-1]):
+        # A joint turns about its frame's z axis: the hand turns with it, and moves across the lever from joint to hand.
         axis = frame[:3, 2]
         result[:3, joint] = np.cross(axis, tip - frame[:3, 3])
         result[3:, joint] = axis
@@ -94,11 +96,11 @@ def jacobian(frames: list[Floats]) -> Floats:
 
 
 def solve(wanted: Floats, start: Floats, rest: Floats) -> Posture:
-    """Return the posture near `start` (J,) whose hand comes nearest to the frame `wanted` (4, 4).
+    """Return the posture near `start` (J,) whose hand is nearest to the frame `wanted` (4, 4).
 
-    Least squares, damped by the squared error (Sugihara 2011), within the joints' limits: a joint that would leave its
-    range is held there while the others go on. The seventh freedom drifts towards `rest` (J,). Going on from the last
-    posture, the arm never flips from one posture to another.
+    Least squares, damped by the squared error (Sugihara 2011), within the joint limits: a joint that would leave its
+    range is held at the limit while the others move. The seventh degree of freedom drifts towards `rest` (J,). Started
+    from the last posture, the solution does not jump to another branch.
     """
     low, high = LOWEST + LIMIT_MARGIN, HIGHEST - LIMIT_MARGIN
     angles = np.clip(start, low, high)
@@ -107,6 +109,7 @@ def solve(wanted: Floats, start: Floats, rest: Floats) -> Posture:
         error = _difference(wanted, frames[-1])
         place, turn = float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
         done = place < 0.5 * PLACE_TOLERANCE and turn < 0.5 * TURN_TOLERANCE
+        # At least one iteration, even at the wanted frame: a held point that does not move still drifts to rest.
         if (done and iteration > 0) or iteration == MOST_ITERATIONS:
             break
         angles = np.clip(angles + _step(jacobian(frames), error, angles, rest, low, high), low, high)
@@ -114,16 +117,22 @@ def solve(wanted: Floats, start: Floats, rest: Floats) -> Posture:
 
 
 def _step(slopes: Floats, error: Floats, angles: Floats, rest: Floats, low: Floats, high: Floats) -> Floats:
-    """Return the change of the angles (J,) in one iteration, with joints held that would leave their range."""
+    """Return the change of the angles (J,) in one iteration; joints that would leave their range are held."""
     free = np.ones(len(angles), dtype=bool)
     step = np.zeros(len(angles))
     for _ in range(len(angles)):
         own = slopes[:, free]
+        # The error damps the inverse: far away or out of reach, where the linear model is wrong or singular, steps are
+        # short and stable; close by, the damping almost vanishes and convergence is fast.
         weights = own.T @ np.linalg.inv(own @ own.T + (LEAST_DAMPING + error @ error) * np.eye(6))
         pull = REST_PULL * (rest - angles)[free]
         step = np.zeros(len(angles))
+        # The pull alone would move the hand. Subtracting its effect from the error leaves only its part in the null
+        # space of the Jacobian: the elbow moves towards rest, the hand to its target.
         step[free] = weights @ (error - own @ pull) + pull
         step *= min(1.0, LONGEST_STEP / max(np.abs(step).max(), 1e-9))
+        # A step that is merely clipped would lose this joint's part of the motion. Without its column, the others are
+        # solved again to make up for it; holding one joint may push the next to its limit, hence the loop.
         leaving = free & (((angles >= high - 1e-9) & (step > 0.0)) | ((angles <= low + 1e-9) & (step < 0.0)))
         if not leaving.any():
             break
@@ -132,10 +141,12 @@ def _step(slopes: Floats, error: Floats, angles: Floats, rest: Floats, low: Floa
 
 
 def _difference(wanted: Floats, frame: Floats) -> Floats:
-    """Return (6,): the way, m, and the turn as a rotation vector, rad, from one frame to the wanted one."""
+    """Return (6,): the translation, m, and the rotation vector, rad, from a frame to the wanted one."""
     turn = wanted[:3, :3] @ frame[:3, :3].T
     axis = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     sine, cosine = float(np.linalg.norm(axis)), 0.5 * (float(np.trace(turn)) - 1.0)
+    # From sine and cosine, since either one is inaccurate or ambiguous for some angles. Near zero,
+    # where the axis has no direction, sine and angle are equal.
     angle = float(np.arctan2(sine, cosine))
     vector = axis * (angle / sine) if sine > 1e-9 else axis
     return np.concatenate([wanted[:3, 3] - frame[:3, 3], vector])

@@ -1,6 +1,6 @@
-"""What the planar tasks share: the three-link chain tool and a simulator with one pymunk space per slot.
+"""Shared by the planar tasks: the three-link chain tool and a simulator with one pymunk space per slot.
 
-Shapes: `B` slots, `b` the slots a call names, `D` = 5 design parameters (l1, l2, l3, theta1, theta2).
+Shapes: `B` slots, `b` the slots of a call, `D` = 5 design parameters (l1, l2, l3, theta1, theta2).
 Lengths are in m, angles in rad, times in s. The chain is the paper's (section "Tool design space").
 """
 
@@ -45,11 +45,11 @@ PLACE, VELOCITY = slice(0, 2), slice(2, 4)
 """Columns of `PlanarSimulator.bodies`: x and y (m); velocity along x and y (m/s)."""
 
 CHAIN_GRAPH = ToolGraph(num_nodes=3, edges=((0, 1), (1, 2)), parameter_nodes=(0, 1, 2, 1, 2))
-"""Three links in a row; the robot holds the free end of link 0; a joint's angle belongs to the link behind it."""
+"""Three links in a row; the robot holds the free end of link 0; a joint's angle belongs to the link after it."""
 LENGTH_NAMES = ("link_1_length", "link_2_length", "link_3_length")
 ANGLE_NAMES = ("joint_1_angle", "joint_2_angle")
 LENGTHS, ANGLES = slice(0, len(LENGTH_NAMES)), slice(len(LENGTH_NAMES), len(LENGTH_NAMES) + len(ANGLE_NAMES))
-"""Where a design of `chain_design_space` holds the links' lengths (m) and the joints' angles (rad)."""
+"""Positions of the links' lengths (m) and the joints' angles (rad) in a design of `chain_design_space`."""
 
 
 def chain_design_space(
@@ -58,7 +58,7 @@ def chain_design_space(
     angle_scale: float,
     angle_ratio: tuple[float, float],
 ) -> Box:
-    """Return a chain's design space: length = init (1 + ratio), angle = scale ratio; `angle_scale` in degrees."""
+    """Return a chain's design space: length = init (1 + ratio), angle = scale * ratio; `angle_scale` in degrees."""
     lengths = {
         name: (length * (1.0 + length_ratio[0]), length * (1.0 + length_ratio[1]), "m")
         for name, length in zip(LENGTH_NAMES, length_init, strict=True)
@@ -72,6 +72,7 @@ def chain_points(designs: Floats, first_link_angle: float) -> Floats:
 
     The first link points along `first_link_angle` (rad, from the x axis); each joint turns the rest of the chain.
     """
+    # Joint angles are relative to the link before, so a link's heading is the sum of all angles up to it.
     headings = first_link_angle + np.cumsum(np.pad(designs[:, ANGLES], ((0, 0), (1, 0))), axis=1)
     steps = designs[:, LENGTHS, None] * np.stack([np.cos(headings), np.sin(headings)], axis=-1)
     points = np.zeros((len(designs), 4, 2))
@@ -80,7 +81,7 @@ def chain_points(designs: Floats, first_link_angle: float) -> Floats:
 
 
 def chain_material(designs: Floats, space: Box) -> Floats:
-    """Return the used share (b,) of the largest total link length of a chain's `space`, for designs (b, D)."""
+    """Return the total link length (b,) as a fraction of the largest in `space`, for designs (b, D)."""
     total: Floats = designs[:, LENGTHS].sum(axis=1) / sum(space.high[LENGTHS])
     return total
 
@@ -99,17 +100,17 @@ class View:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of a picture in pixels, both even, as video encoders want them."""
+        """Width and height of a picture in pixels, both even, as video encoders require."""
         width, height = self.x[1] - self.x[0], self.y[1] - self.y[0]
         scale = PICTURE_PIXELS / max(width, height)
         return 2 * round(0.5 * scale * width), 2 * round(0.5 * scale * height)
 
 
 class PlanarSimulator(Simulator):
-    """One pymunk space per slot, built anew for every episode so that nothing of the last one can reach the next.
+    """One pymunk space per slot, rebuilt for every episode so that no state carries over to the next.
 
-    All bodies of all slots are read with one buffer. A subclass fills each space in `build_space`, its moving bodies
-    first the same in every episode.
+    All bodies of all slots are read with one buffer. A subclass fills each space in `build_space`, and adds the moving
+    bodies in the same order in every episode.
     """
 
     view: ClassVar[View]
@@ -124,7 +125,7 @@ class PlanarSimulator(Simulator):
 
     @abstractmethod
     def build_space(self, slot: int, points: Floats) -> pymunk.Space:
-        """Return a fresh space for the slot's episode with the tool whose chain has `points` (4, 2), held end first."""
+        """Return a new space for the slot's episode with the tool of chain `points` (4, 2), held end first."""
 
     def add_spaces(self, slots: Slots, points: Floats) -> None:
         """Build the spaces of `slots` for tools with chain `points` (b, 4, 2)."""
@@ -132,7 +133,7 @@ class PlanarSimulator(Simulator):
             self.spaces[slot] = self.build_space(slot, chain)
 
     def advance(self, slots: Slots) -> None:
-        """Make pymunk's steps of one control step in the spaces of `slots`."""
+        """Take the physics steps of one control step in the spaces of `slots`."""
         period, steps = self.clock.period, range(self.clock.steps)
         for slot in slots.tolist():
             step = self.spaces[slot].step
@@ -140,18 +141,19 @@ class PlanarSimulator(Simulator):
                 step(period)
 
     def read_bodies(self, slots: Slots) -> Floats:
-        """Read positions and velocities of the bodies of `slots` into `bodies`; return them, (b, bodies, 4)."""
+        """Read positions and velocities of the bodies of `slots` into `bodies` and return them, (b, bodies, 4)."""
         self._buffer.clear()
         fields = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
         for slot in slots.tolist():
             batch.get_space_bodies(self.spaces[slot], fields, self._buffer)
         rows = np.frombuffer(self._buffer.float_buf()).reshape(len(slots), -1, 4)
-        # The space's own static body comes last; without sleeping, the others keep the order they were added in.
+        # The space's static body comes last. The others keep the order in which they were added,
+        # because sleeping is off.
         self.bodies[slots] = rows[:, : self.bodies.shape[1]]
         return self.bodies[slots]
 
     def inspect(self, slot: int) -> Physics:
-        """Return deepest overlap, fastest body and whether all moving bodies lie in the picture's part of the plane."""
+        """Return the deepest overlap, the highest speed, and whether all moving bodies are within the view."""
         space, view = self.spaces[slot], self.view
         moving = [body for body in space.bodies if body.body_type == pymunk.Body.DYNAMIC]
         inside = all(
@@ -164,7 +166,7 @@ class PlanarSimulator(Simulator):
         )
 
     def tool_shapes(self, slot: int) -> tuple[PlanarPart, ...]:
-        """Return the segments of the body that moves: nothing else that moves has any."""
+        """Return the segments of the moving body; no other moving body has segments."""
         return tuple(
             PlanarPart((shape.a.x, shape.a.y), (shape.b.x, shape.b.y), shape.radius)
             for shape in self.spaces[slot].shapes
@@ -174,7 +176,7 @@ class PlanarSimulator(Simulator):
         )
 
     def render(self, slot: int) -> Frame:
-        """Return a picture of every shape in the space, and of what the task adds in `mark`."""
+        """Return a picture of every shape in the space and of the marks that the task adds in `mark`."""
         canvas = Canvas(self.view)
         self.mark(slot, canvas)
         for kind in (pymunk.Body.STATIC, pymunk.Body.KINEMATIC, pymunk.Body.DYNAMIC):
@@ -184,11 +186,11 @@ class PlanarSimulator(Simulator):
         return canvas.frame()
 
     def mark(self, slot: int, canvas: Canvas) -> None:
-        """Draw what is no body, below the bodies: a goal, a line. Nothing by default."""
+        """Draw marks that are not bodies, e.g. a goal or a line, below the bodies. Nothing by default."""
 
 
 def overlap(space: pymunk.Space, shape: pymunk.Shape) -> float:
-    """Return how deep `shape` lies in any other shape that it may collide with, m."""
+    """Return the depth of the deepest overlap of `shape` with a shape that it may collide with, m."""
     deepest = 0.0
     for other in space.shape_query(shape):
         if other.shape is not None and other.shape.body is not shape.body:
@@ -197,7 +199,7 @@ def overlap(space: pymunk.Space, shape: pymunk.Shape) -> float:
 
 
 class Canvas:
-    """A picture of a part of the plane, drawn at twice its size and then shrunk so that edges are smooth."""
+    """A picture of a part of the plane, drawn at twice its size and then scaled down for smooth edges."""
 
     OVERSAMPLING = 2
 
@@ -209,7 +211,7 @@ class Canvas:
         self._draw = ImageDraw.Draw(self._image)
 
     def shape(self, shape: pymunk.Shape, body: pymunk.Body) -> None:
-        """Draw a circle, segment or polygon of `body` in the colour of its kind of body."""
+        """Draw a circle, segment or polygon of `body` in the colour of its body type."""
         kind = {pymunk.Body.DYNAMIC: "object", pymunk.Body.STATIC: "scene", pymunk.Body.KINEMATIC: "tool"}
         colour = getattr(shape, "colour", COLOURS[kind[body.body_type]])
         if isinstance(shape, pymunk.Circle):
@@ -244,7 +246,12 @@ class Canvas:
 
 
 def chain_tool(points: Floats, friction: float) -> tuple[pymunk.Body, list[pymunk.Segment]]:
-    """Return a kinematic body with one rounded segment per link of the chain `points` (4, 2); links never collide."""
+    """Return a kinematic body with one rounded segment per link of the chain `points` (4, 2).
+
+    Links of one body do not collide with each other.
+    """
+    # Kinematic: the robot imposes the motion, and contact forces do not slow the tool. Mass and inertia of the chain,
+    # which depend on the design, then play no part.
     body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
     corners = [tuple(point) for point in points.tolist()]
     links = [pymunk.Segment(body, *ends, LINK_HALF_WIDTH) for ends in pairwise(corners)]

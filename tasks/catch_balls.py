@@ -48,7 +48,7 @@ from ._planar import (
 PAPER = "paper, table of catch balls"
 
 HAND_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([20.0, 10.0])
-"""Where the held end starts; it moves along x alone (paper)."""
+"""Where the held end starts; it moves only along x (paper)."""
 LENGTH_INIT: Annotated[tuple[float, float, float], Given("m", PAPER, "tool_length_init")] = (2.0, 1.0, 1.0)
 """Of the links, from which the design space is made: length = initial length (1 + ratio)."""
 LENGTH_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_length_ratio")] = (-0.5, 2.0)
@@ -58,29 +58,29 @@ ANGLE_SCALE: Annotated[float, Given("degrees", PAPER, "tool_angle_scale")] = 60.
 ANGLE_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_angle_ratio")] = (-1.0, 1.0)
 """Range of an angle's ratio."""
 FIRST_LINK_ANGLE: Annotated[float, Given("rad", OURS)] = -0.5 * np.pi
-"""The first link hangs down from the hand: both joints turned one way make a pan on that side of it."""
+"""The first link hangs down from the hand: both joints turned to one side form a pan on that side."""
 RAIL: Annotated[float, Given("m", OURS)] = 5.0
-"""How far the hand can go to the left or right within the time limit."""
+"""How far the hand can move to the left or right within the time limit."""
 MAX_SPEED: Annotated[float, Given("m/s", OURS)] = 1.0
-"""Largest speed of the hand: until the balls come down it cannot change the side of a tool."""
+"""Largest speed of the hand: too slow to bring a tool to the other side before the balls land."""
 MAX_ACCELERATION: Annotated[float, Given("m/s^2", OURS)] = 10.0
-"""Largest acceleration of the hand: a tool does not bat balls."""
+"""Largest acceleration of the hand: too small to hit balls away."""
 
 NUM_BALLS: Annotated[int, Given("balls", 'paper, appendix "Environment Details"')] = 3
-"""Thrown in an episode."""
+"""Number of balls in an episode."""
 BALL_RADIUS: Annotated[float, Given("m", OURS)] = 0.5
-"""Of a ball."""
+"""Radius of a ball."""
 GRAVITY: Annotated[float, Given("m/s^2", OURS)] = 8.0
 """Of the scene."""
 LINK_FRICTION: Annotated[float, Given("1", OURS)] = 0.7
-"""Between link and ball. The first link has none, so that no ball balances on the hand."""
+"""Friction between link and ball. The first link has none, so that no ball balances on the hand."""
 BALL_FRICTION: Annotated[float, Given("1", OURS)] = 0.04
-"""Between two balls: they do not stay piled up as a tower."""
+"""Friction between two balls: too little for a stable tower."""
 
 LANDING_DISTANCE: Annotated[tuple[float, float], Given("m", OURS)] = (1.0, 5.0)
-"""Smallest and largest distance from the hand's start of the place where the balls come down."""
+"""Smallest and largest distance of the landing place from the hand's start."""
 LANDING_SPREAD: Annotated[float, Given("m", OURS)] = 1.2
-"""Largest distance of a ball's own place from that place."""
+"""Largest distance of a single ball's landing place from it."""
 START_HEIGHTS: Annotated[tuple[tuple[float, float], ...], Given("m", OURS)] = (
     (16.5, 17.0),
     (18.25, 18.75),
@@ -91,20 +91,20 @@ THROW_SPEED: Annotated[float, Given("m/s", OURS)] = 3.0
 """Largest speed along x at which a ball is thrown."""
 
 SLOW: Annotated[float, Given("m/s", OURS)] = 0.5
-"""A ball lies still on the tool if it is slower than this, as seen from the tool."""
+"""A ball is at rest on the tool if it is slower than this relative to the tool."""
 PILE_HEIGHT: Annotated[float, Given("m", OURS)] = 2.5
-"""A ball whose centre is less than this above a link lies on it or on balls that lie on it."""
+"""A ball whose centre is less than this above a link is on the link or on balls on it."""
 HOLD_STEPS: Annotated[int, Given("control steps", OURS)] = 15
-"""A ball is caught once it has been held for so long in a row."""
+"""A ball is caught once it has been held for this many consecutive steps."""
 SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
 """Added in every control step."""
 SUCCESS_REWARD: Annotated[float, Given("1", "ours; the paper lists one for its 3D tasks only")] = 1.0
 """Added once, when all balls are caught."""
 
 FLOOR: Annotated[float, Given("m", OURS)] = -6.0
-"""Height of the floor: even the longest tool leaves room for a pile of three balls beneath it."""
+"""Height of the floor: a pile of three balls fits below the longest tool."""
 WALLS: Annotated[tuple[float, float], Given("m", OURS)] = (6.0, 34.0)
-"""Where walls end the scene on the left and right: no tool gets as near to them as two balls are wide."""
+"""Walls on the left and right: every tool stays more than two balls' width away from them."""
 
 HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 150
 """Time limit."""
@@ -135,7 +135,7 @@ BALL = Box.of(
     velocity_y=(-25.0, 25.0, "m/s"),
     held=(0.0, 1.0, "1"),
 )
-"""What is observed of one ball."""
+"""Observation of one ball."""
 STATE = Box.of(
     hand_x=(float(HAND_START[0]) - RAIL, float(HAND_START[0]) + RAIL, "m"),
     hand_velocity=(-MAX_SPEED, MAX_SPEED, "m/s"),
@@ -154,41 +154,40 @@ BALL_BODIES, TOOL_BODY = slice(0, NUM_BALLS), NUM_BALLS
 class CatchBalls(Task):
     """Catch three balls that fall from the sky (paper, appendix "Environment Details").
 
-    Seen from the side, a hand moves along a rail and holds a chain of three links; the first hangs down from it, the
-    other two can be turned to the left or to the right and so make a pan on that side. The balls are thrown and come
-    down around one place to the left or to the right of the hand. The hand is too slow to bring a pan from one side to
-    the other before they arrive, so a tool that catches on one side hardly catches on the other. How far away the balls
-    come down decides how long the links must be, or how far the hand must move.
+    Seen from the side, a hand moves along a rail and holds a chain of three links. The first hangs down from the hand;
+    the other two can turn to the left or to the right and form a pan on that side. The balls are thrown and land around
+    one place to the left or to the right of the hand. The hand is too slow to bring a pan from one side to the other
+    before they land, so a tool for one side hardly catches on the other. The distance of the landing place determines
+    how long the links must be, or how far the hand must move.
 
     Action space
         Design, 5: lengths of the three links (m) and the two angles between them (rad) (paper). Control, 1: velocity of
         the hand along x (m/s) (paper; range ours); the hand's acceleration is limited (ours).
 
     Observation
-        State, 17: place x (m) and velocity (m/s) of the hand; for each ball, way from the hand x, y (m), velocity x, y
-        (m/s), and whether it is held. Goal, 1: x of the place where the balls come down (m). Then the design and the
-        phase.
+        State, 17: position x (m) and velocity (m/s) of the hand; for each ball, displacement from the hand x, y (m),
+        velocity x, y (m/s), and whether it is held. Goal, 1: x of the landing place (m). Then the design and the phase.
 
     Design space
         Length = initial length (1 + ratio), angle = scale * ratio (our reading of the paper's table). The first link
         points down (ours); positive angles turn the chain to the right.
 
     Goal space
-        Where the balls come down, left or right of the hand's start, uniform (ours). The balls' starts vary as in the
-        paper: each has a height, a speed along x and its own place near the goal where it reaches the hand's height.
-        They are no part of the goal, but the state shows them at the design step.
+        Landing places to the left or right of the hand's start, uniform (ours). The balls' starts vary as in the paper:
+        each ball has a height, a speed along x, and a position near the goal at which it reaches the hand's height.
+        They are not part of the goal, but the state contains them at the design step.
 
     Reward
-        The change in the share of balls that are held, less the paper's slack, and a bonus on success. A ball is held
-        if its centre is a little above a link and below the hand, and if it is slow as seen from the tool. What is let
-        go again is taken back, so nothing is earned twice. An episode's return is below 2.
+        The change in the fraction of balls that are held, plus the paper's slack (negative) and a bonus on success. A
+        ball is held if its centre is a little above a link and below the hand, and if it is slow relative to the tool.
+        Dropping a ball costs what holding it earned, so nothing is earned twice. An episode's return is below 2.
 
     Starting state
-        The hand at rest where the paper's table has it; the balls above every tool, each at its own height (ours).
+        The hand at rest at the paper's position; the balls above every tool, at different heights (ours).
 
     Episode end
-        Success when every ball is caught, that is, has been held for a while and still is; failure when a ball is lost
-        and no other can be caught any more; or the time limit.
+        Success when every ball is caught, that is, all have been held for some steps; failure when a ball is lost and
+        all others are lost or caught; or the time limit.
     """
 
     name = "catch_balls"
@@ -225,23 +224,23 @@ class CatchBalls(Task):
     )
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
-        """Return (count, I) random throws; the balls come down left or right of the hand, equally often."""
+        """Return (count, I) random throws; the balls land left or right of the hand with equal probability."""
         instances = self.instance_space.sample(rng, count)
         distance = rng.uniform(*LANDING_DISTANCE, size=count)
         instances[:, LANDING] = HAND_START[0] + distance * np.where(rng.random(count) < 0.5, -1.0, 1.0)
         return instances
 
     def in_region(self, instances: Floats) -> Booleans:
-        """Return which goals (b, I) are at a distance from the hand at which balls come down."""
+        """Return which goals (b, I) are within the range of landing distances from the hand."""
         near, far = LANDING_DISTANCE
         distance = np.abs(instances[:, LANDING] - HAND_START[0])
         inside: Booleans = (near <= distance) & (distance <= far)
         return inside
 
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
-        """Return which goals (b, I) are in the middle `fraction` of the places on the left or of those on the right.
+        """Return which goals (b, I) are in the middle `fraction` of the landing places on the left or on the right.
 
-        These are two patches, after the paper's of fetch cube (ours).
+        These are two patches (ours, after the paper's patches of fetch cube).
         """
         near, far = LANDING_DISTANCE
         distance = np.abs(instances[:, LANDING] - HAND_START[0])
@@ -249,11 +248,11 @@ class CatchBalls(Task):
         return result
 
     def material(self, designs: Floats) -> Floats:
-        """Return the used share of the largest total link length for designs (b, D) in their units."""
+        """Return the total link length as a fraction of the largest, for designs (b, D) in their units."""
         return chain_material(designs, self.design_space)
 
     def effort(self, controls: Floats) -> Floats:
-        """Return the share of the largest speed of the hand for controls (b, C) in [-1, 1]."""
+        """Return the speed of the hand as a fraction of the largest, for controls (b, C) in [-1, 1]."""
         speed: Floats = np.abs(controls[:, HAND_SPEED])
         return speed
 
@@ -262,8 +261,8 @@ class CatchBalls(Task):
         return chain_parts(chain_points(design[None], FIRST_LINK_ANGLE)[0], LINK_HALF_WIDTH)
 
     def script(self) -> Behaviour:
-        """Return a script that makes a pan on the side where the balls come down and brings its middle beneath them."""
-        from ._scripts.catch_balls import CatchBallsScript  # here, since that file reads this one
+        """Return a script that builds a pan on the side where the balls land and moves its middle beneath them."""
+        from ._scripts.catch_balls import CatchBallsScript  # imported here because that file imports this one
 
         return CatchBallsScript(self)
 
@@ -273,7 +272,7 @@ class CatchBalls(Task):
 
 
 class _CatchSimulator(PlanarSimulator):
-    """Three balls and a kinematic tool per slot, between a floor and two walls that keep what was missed in sight."""
+    """Three balls and a kinematic tool per slot, between a floor and two walls that keep missed balls in view."""
 
     view = View(x=(WALLS[0] - 0.5, WALLS[1] + 0.5), y=(FLOOR - 1.0, FLOOR + 28.0))
 
@@ -281,16 +280,16 @@ class _CatchSimulator(PlanarSimulator):
         super().__init__(num_slots, state_size, num_bodies=NUM_BALLS + 1, clock=clock)
         self.landing = np.zeros(num_slots)
         self.points = np.zeros((num_slots, 4, 2))
-        """(B, 4, 2): corners of the tools from the hand, m."""
+        """(B, 4, 2): corners of the tools relative to the hand, m."""
         self.velocity = np.zeros(num_slots)
-        """(B,) of the hands, m/s."""
+        """(B,) velocities of the hands, m/s."""
         self.held = np.zeros((num_slots, NUM_BALLS), dtype=bool)
         self.held_steps = np.zeros((num_slots, NUM_BALLS), dtype=np.intp)
-        """(B, K): control steps in a row for which a ball has been held."""
+        """(B, K): consecutive control steps for which each ball has been held."""
         self.tools: list[pymunk.Body | None] = [None] * num_slots
 
     def begin(self, slots: Slots, instances: Floats) -> None:
-        """Put hands at their start and balls where the throws `instances` (b, I) begin."""
+        """Put hands at their start and balls at the start of the throws `instances` (b, I)."""
         starts, speeds = throws(instances)
         self.forget(slots)
         self.landing[slots] = instances[:, LANDING]
@@ -311,9 +310,10 @@ class _CatchSimulator(PlanarSimulator):
         """Return the scene of one episode: balls, tool, floor and walls."""
         space = pymunk.Space()
         space.gravity = (0.0, -GRAVITY)
-        own_friction = BALL_FRICTION**0.5  # pymunk multiplies the two frictions of a contact.
+        own_friction = BALL_FRICTION**0.5  # pymunk multiplies the two friction coefficients of a contact
         for x, y, velocity_x, velocity_y in self.bodies[slot, BALL_BODIES].tolist():
-            ball = pymunk.Body(1.0, float("inf"))  # Balls slide and do not roll, so they come to rest on a tool.
+            # With an infinite moment of inertia, balls slide instead of rolling, so they come to rest on a tool.
+            ball = pymunk.Body(1.0, float("inf"))
             ball.position, ball.velocity = (x, y), (velocity_x, velocity_y)
             disc = pymunk.Circle(ball, BALL_RADIUS)
             disc.friction = own_friction
@@ -327,7 +327,7 @@ class _CatchSimulator(PlanarSimulator):
         return space
 
     def step(self, slots: Slots, controls: Floats) -> None:
-        """Move the hands by `controls` (b, C) for one control step and reward the balls that came to be held."""
+        """Move the hands by `controls` (b, C) for one control step and reward newly held balls."""
         change = MAX_ACCELERATION * self.clock.control_period
         before = self.velocity[slots]
         velocity = np.clip(controls[:, HAND_SPEED] * MAX_SPEED, before - change, before + change)
@@ -359,7 +359,7 @@ class _CatchSimulator(PlanarSimulator):
         self._write_state(slots)
 
     def mark(self, slot: int, canvas: Canvas) -> None:
-        """Draw the hand's rail and the place where the balls come down."""
+        """Draw the hand's rail and the landing place."""
         x, y = HAND_START.tolist()
         canvas.segment((x - RAIL, y), (x + RAIL, y), 0.05, COLOURS["scene"])
         canvas.circle((self.landing[slot], y), 0.3, COLOURS["goal"])
@@ -374,9 +374,10 @@ class _CatchSimulator(PlanarSimulator):
 
 
 def throws(instances: Floats) -> tuple[Floats, Floats]:
-    """Return where the balls of `instances` (b, I) start and how fast, (b, K, 2), m and m/s; they start level.
+    """Return positions and velocities of the balls of `instances` (b, I) at the start, each (b, K, 2), m and m/s.
 
-    A ball starts so far from its landing place as it flies until it is as high as the hand.
+    Velocities are horizontal. A ball starts at the horizontal distance from its landing place that it covers until it
+    falls to the height of the hand.
     """
     offset, height, speed = instances[:, OFFSETS], instances[:, HEIGHTS], instances[:, SPEEDS]
     fall = np.sqrt(2.0 / GRAVITY * (height - HAND_START[1]))
@@ -387,12 +388,12 @@ def throws(instances: Floats) -> tuple[Floats, Floats]:
 def is_held(points: Floats, balls: Floats, velocity: Floats) -> Booleans:
     """Return which balls (b, K) are held by tools with chain `points` (b, 4, 2).
 
-    `balls` (b, K, 2) are centres, `velocity` (b, K, 2) velocities, both as seen from the hand. What is slow above a
-    link and stays so lies on it: nothing else is there that could carry it. Above the hand's height it does not count,
-    since there it would balance on the hand itself.
+    `balls` (b, K, 2) are centres, `velocity` (b, K, 2) velocities, both relative to the hand. A ball that stays slow
+    above a link must rest on it, because nothing else there can carry it. A ball above the hand's height does not
+    count, because it would be balanced on the hand.
     """
     start, link = points[:, None, :-1], np.diff(points, axis=1)[:, None]
-    sideways = np.where(np.abs(link[..., 0]) > 1e-6, link[..., 0], np.nan)  # Nothing lies on an upright link.
+    sideways = np.where(np.abs(link[..., 0]) > 1e-6, link[..., 0], np.nan)  # nothing rests on an upright link
     along = (balls[:, :, None, 0] - start[..., 0]) / sideways
     clearance = balls[:, :, None, 1] - (start[..., 1] + along * link[..., 1])
     above = (along >= 0.0) & (along <= 1.0) & (clearance > 0.0) & (clearance < PILE_HEIGHT)
@@ -402,7 +403,7 @@ def is_held(points: Floats, balls: Floats, velocity: Floats) -> Booleans:
 
 
 def _surroundings(body: pymunk.Body, friction: float) -> list[pymunk.Segment]:
-    """Return floor and walls, thick enough that nothing gets through them."""
+    """Return floor and walls, thick enough that nothing passes through them."""
     (left, right), thickness = WALLS, 1.0
     corners = [
         ((left - thickness, FLOOR - thickness), (right + thickness, FLOOR - thickness)),

@@ -57,9 +57,9 @@ PAPER = "paper, table of fetch cube"
 UNSEEN = 'paper, section "Generalization to Unseen Goals Experiment Details"'
 
 PAPER_ORIGIN: Annotated[float, Given("m", OURS)] = 1.2
-"""The robot's base stands at the origin and y points away from it: y = 1.2 m - y of the paper.
+"""The robot's base is at the origin and y points away from it: y = 1.2 m - y of the paper.
 
-The paper prints cube starts in two frames; this is the shift that makes its real starts -y and its fine-tuning starts
+The paper prints cube starts in two frames; with this shift its real starts are at -y and its fine-tuning starts are
 unsolved (see docs/tasks/fetch_cube.md).
 """
 CUBE_X: Annotated[tuple[float, float], Given("m", UNSEEN, "fetch_cube_region.x")] = (-0.395, 0.395)
@@ -67,7 +67,7 @@ CUBE_X: Annotated[tuple[float, float], Given("m", UNSEEN, "fetch_cube_region.x")
 PAPER_CUBE_Y: Annotated[tuple[float, float], Given("m", UNSEEN, "fetch_cube_region.y")] = (0.4, 0.7)
 """Starts of the cube's centre along y, in the paper's frame."""
 CUBE_Y = (PAPER_ORIGIN - PAPER_CUBE_Y[1], PAPER_ORIGIN - PAPER_CUBE_Y[0])
-"""The same in our frame, m."""
+"""Starts of the cube's centre along y, in our frame, m."""
 PAPER_FINE_TUNING: Annotated[tuple[tuple[float, float], ...], Given("m", UNSEEN, "fine_tuning_starts")] = (
     (-0.167, 0.367),
     (-0.129, 0.357),
@@ -78,41 +78,41 @@ PAPER_FINE_TUNING: Annotated[tuple[tuple[float, float], ...], Given("m", UNSEEN,
 CUBE_SIZE: Annotated[float, Given("m", REAL_ROBOT)] = 0.05
 """Side of the cube."""
 CUBE_MASS: Annotated[float, Given("kg", OURS)] = 0.1
-"""Of the cube."""
+"""Mass of the cube."""
 GOAL_DISTANCE: Annotated[float, Given("m", REAL_ROBOT, "fetch_cube_distance")] = 0.5
 """The cube is fetched when its centre is closer to the robot's base than this."""
 
 HOLD_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([0.0, 0.5, 0.02])
 """Where the held point starts."""
 HOLD_X: Annotated[tuple[float, float], Given("m", "paper: 0.8 m wide; place ours")] = (-0.4, 0.4)
-"""Where the held point may go along x."""
+"""Range of the held point along x."""
 HOLD_Y: Annotated[tuple[float, float], Given("m", "paper: 0.2 m deep; place ours")] = (0.3, 0.5)
-"""Where the held point may go along y: before the overhang's edge."""
+"""Range of the held point along y: in front of the overhang's edge."""
 HOLD_TOP: Annotated[float, Given("m", OURS)] = 0.04
-"""Highest place of the held point: a thin tool meets the cube's side, never its top."""
+"""Largest height of the held point: a thin tool touches the cube's side, never its top."""
 GROUND_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.001
-"""Between the tallest link and the table."""
+"""Gap between the tallest link and the table."""
 START_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.005
-"""A tool that would start closer to the cube than this starts left or right of there, whichever is nearer."""
+"""A tool that would start closer to the cube than this is shifted to the left or right, whichever is nearer."""
 STEP_LENGTH: Annotated[float, Given("m", OURS, "control_action_scale")] = 0.02
-"""Largest move of the held point in one control step, in the plane and vertically: at the paper's scale it would be as
-fast as 2.4 m/s, and cubes would be shot from the table."""
+"""Largest displacement of the held point in one control step, in the plane and vertically. The paper's scale would mean
+up to 2.4 m/s, and cubes would be shot off the table."""
 
 OVERHANG_Y: Annotated[tuple[float, float], Given("m", OURS)] = (0.5, 1.1)
-"""Where the overhang hides the table."""
+"""Range of the overhang along y."""
 OVERHANG_X: Annotated[tuple[float, float], Given("m", OURS)] = (-0.75, 0.75)
-"""Ends of the overhang: wider than any tool reaches with its held point in its box."""
+"""Range of the overhang along x: wider than the reach of any tool."""
 OVERHANG_HEIGHT: Annotated[float, Given("m", OURS)] = 0.08
-"""Of its underside above the table: 2 cm above any tool."""
+"""Height of its underside above the table: 2 cm above any tool."""
 OVERHANG_THICKNESS: Annotated[float, Given("m", OURS)] = 0.02
-"""Of the overhang."""
+"""Thickness of the overhang."""
 TABLE_FRICTION: Annotated[float, Given("1", OURS)] = 0.5
-"""Between cube and table."""
+"""Friction between cube and table."""
 TOOL_FRICTION: Annotated[float, Given("1", OURS)] = 0.7
-"""Between cube and tool: lets the cube be dragged by a link at up to 35 degrees from square."""
+"""Friction between cube and tool: a link can drag the cube at up to 35 degrees from its normal."""
 
 PROGRESS_WEIGHT: Annotated[float, Given("1/m", OURS)] = 10.0
-"""Reward per metre that the cube comes nearer."""
+"""Reward per metre that the cube moves nearer."""
 SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
 """Added in every control step."""
 SUCCESS_REWARD: Annotated[float, Given("1", PAPER, "success_reward")] = 10.0
@@ -151,9 +151,9 @@ GRID_SHAPE: Annotated[tuple[int, int], Given("starts", REAL_ROBOT, "grid_shape")
 GRID_EXTENT: Annotated[tuple[float, float], Given("m", REAL_ROBOT, "grid_extent")] = (0.12, 0.856)
 """Depth and width of this grid."""
 ARM_BASE: Annotated[Triple, Given("m", "paper: at the origin; on the table: ours")] = (0.0, 0.0, 0.0)
-"""Where a robot's base stands."""
+"""Position of a robot's base."""
 ARM_CAMERA = Camera(eye=(0.0, 1.75, 1.0), target=(0.0, 0.38, 0.16))
-"""Sees arm and cube in deployment: from behind the overhang."""
+"""View of arm and cube in deployment, from behind the overhang."""
 
 SIZE_NAMES = ("width", "length", "height")
 DESIGN = Box.of(
@@ -178,7 +178,7 @@ INSTANCE = Box.of(cube_start_x=(*CUBE_X, "m"), cube_start_y=(*CUBE_Y, "m"))
 START_X, START_Y = INSTANCE.index("cube_start_x"), INSTANCE.index("cube_start_y")
 
 CHAIN_NAMES = ("hold", "joint_1", "joint_2", "tip")
-"""Points of the chain, from the held point on."""
+"""Points of the chain, starting at the held point."""
 TO_CUBE_NAMES = tuple(f"{point}_to_cube_{axis}" for point in CHAIN_NAMES for axis in "xy")
 STATE = Box.of(
     cube_x=(-1.5, 1.5, "m"),
@@ -199,47 +199,47 @@ CUBE_DISTANCE, TO_CUBE = STATE.index("cube_distance"), STATE.slice(*TO_CUBE_NAME
 HOLD, HOLD_IN_PLANE = STATE.slice("hold_x", "hold_y", "hold_z"), STATE.slice("hold_x", "hold_y")
 
 XY = slice(0, 2)
-"""The horizontal part of a place, m, or of a velocity, m/s."""
+"""The horizontal part of a position, m, or of a velocity, m/s."""
 
 
 class FetchCube(Task):
     """Fetch a cube from under an overhang (paper, section "Environments" and appendix "Environment Details").
 
-    The robot holds one end of a chain of three boxes and moves it, without turning it, in a box before the overhang.
+    The robot holds one end of a chain of three boxes and moves it, without rotation, in a box in front of the overhang.
     The cube is beneath the overhang and must come close to the robot's base, which is at the origin; y points away from
-    the robot. The tool meets the cube's sides alone, so a link must stand behind the cube, and the cube's start decides
-    which can: a hook for cubes in the middle, a chain that is bent inwards for those at the sides. One pull moves the
-    cube no further than the held point's box is deep; cubes further away must be pulled twice, the second time by a
+    the robot. The tool can touch only the cube's sides, so a link must be behind the cube. The cube's start determines
+    which shape can do that: a hook for cubes in the middle, a chain bent inwards for those at the sides. One pull moves
+    the cube at most by the depth of the held point's box. Cubes further away must be pulled twice, the second time by a
     part of the tool that is closer to the hand.
 
     Action space
         Design, 11: width, length and height of each of three links (m) and the two angles between them (rad) (paper).
-        Control, 3: change of the held point's place x, y, z in a control step (m) (paper; range ours); its length is
-        limited in the plane, not along each axis.
+        Control, 3: displacement x, y, z of the held point in a control step (m) (paper; range ours); its horizontal
+        length is limited, not each axis.
 
     Observation
-        State, 18: place and velocity of the cube x, y (m, m/s), cosine and sine of four times its turn about the
-        vertical, its distance from the base (m), the held point x, y, z (m), and the ways from the held point, the two
-        joints and the tip to the cube, x and y of each (m). Goal, 2: start of the cube x, y (m). Then the design and
-        the phase. Before there is a tool its joints and its tip count as being at the held point.
+        State, 18: position and velocity of the cube x, y (m, m/s), cosine and sine of four times its angle about the
+        vertical, its distance from the base (m), the held point x, y, z (m), and the displacements from the held point,
+        the two joints and the tip to the cube, x and y of each (m). Goal, 2: start of the cube x, y (m). Then the
+        design and the phase. Before the tool exists, its joints and tip are set to the held point.
 
     Design space
-        Link by link, then the angles. Sizes are whole widths, lengths and heights: the paper's table is read as half
-        extents, PyBullet's own measure, since tools of half the size would not reach behind the far cubes (ours). The
-        first link points away from the robot (ours); both joints turn about the vertical. The table has three angles,
-        of which the third is not used.
+        Link by link, then the angles. Sizes are full widths, lengths and heights: we read the paper's table as half
+        extents, PyBullet's convention, since tools of half the size would not reach behind the far cubes (ours). The
+        first link points away from the robot (ours); both joints turn about the vertical. The table has three angles;
+        the third is not used.
 
     Goal space
         Starts of the cube, uniform in a rectangle (paper, in our frame).
 
     Reward
-        The way by which the cube came nearer to the base, less the paper's slack, and the paper's bonus on success.
-        Progress telescopes, so nothing is earned by moving the cube to and fro. An episode's return is below 15.
+        The decrease of the cube's distance from the base, plus the paper's slack (negative) and the paper's bonus on
+        success. Progress telescopes, so moving the cube back and forth earns nothing. An episode's return is below 15.
 
     Starting state
-        The cube at rest at its start; the held point where the paper's table has it, at the overhang's edge (ours),
-        raised if a link is too high for that. A tool that would then be too close to the cube starts at the nearest
-        place to the left or right of there that is not (ours). So a tool may start with its hook behind the cube.
+        The cube at rest at its start; the held point at the paper's position, at the overhang's edge (ours), raised if
+        a link is too high for that. A tool that would be too close to the cube there starts at the nearest clear
+        position to the left or right (ours). So a tool may start with its hook behind the cube.
 
     Episode end
         Success when the cube's centre is close enough to the base, or the time limit.
@@ -273,8 +273,8 @@ class FetchCube(Task):
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
         """Return which starts (b, I) are in the two patches that cover `fraction` of the training region.
 
-        The paper's patches are the left and the right half of the region, each shrunk about its centre by the root of
-        the fraction: those that it prints cover 0.597, so we read them as 0.6 and scale the halves to any other (ours).
+        The paper's patches are the left and the right half of the region, each shrunk about its centre by the square
+        root of the fraction. The printed patches cover 0.597; we read this as 0.6 and scale to other fractions (ours).
         """
         half = 0.5 * np.sqrt(fraction)
         width, depth = CUBE_X[1], CUBE_Y[1] - CUBE_Y[0]
@@ -289,14 +289,14 @@ class FetchCube(Task):
         return np.stack([x, PAPER_ORIGIN - y], axis=1)
 
     def material(self, designs: Floats) -> Floats:
-        """Return the used share of the largest total volume of the links for designs (b, D) in their units."""
+        """Return the volume of the links as a fraction of the largest, for designs (b, D) in their units."""
         sizes = designs[:, LINK_SIZES].reshape(-1, NUM_LINKS, len(SIZE_NAMES))
         largest = NUM_LINKS * np.prod([high for _, high in SIZES])
         volume: Floats = sizes.prod(axis=2).sum(axis=1) / largest
         return volume
 
     def effort(self, controls: Floats) -> Floats:
-        """Return the share of the largest move for controls (b, C) in [-1, 1]."""
+        """Return the displacement as a fraction of the largest, for controls (b, C) in [-1, 1]."""
         length: Floats = np.linalg.norm(controls, axis=1) / np.sqrt(controls.shape[1])
         return length
 
@@ -305,8 +305,8 @@ class FetchCube(Task):
         return box_parts(chain_boxes(design[None])[1])
 
     def script(self) -> Behaviour:
-        """Return a script that pulls the cube with whichever side of a link it can bring behind it."""
-        from ._scripts.fetch_cube import FetchCubeScript  # here, since that file reads this one
+        """Return a script that pulls the cube with a side of a link that it can move behind the cube."""
+        from ._scripts.fetch_cube import FetchCubeScript  # imported here because that file imports this one
 
         return FetchCubeScript(self)
 
@@ -323,10 +323,10 @@ class FetchCube(Task):
 def _robot_trials() -> RobotTrials:
     """Return the four starts of the paper's tools and its 3 x 4 grid, in our frame.
 
-    The real robot's frame is turned by half a turn about the vertical, (x, y) -> (-x, -y): that makes y point away from
-    the base and keeps left and right apart, as a mirror would not. The paper does not say where its grid is: ours is
-    centred on the region of starts, so that the row nearest to the robot passes the start of tool 2; at both sides it
-    reaches 3 cm beyond the region.
+    The real robot's frame is rotated by half a turn about the vertical, (x, y) -> (-x, -y): then y points away from the
+    base, and unlike a reflection this does not swap left and right. The paper does not give the position of its grid.
+    Ours is centred on the region of starts, so that the row nearest to the robot passes the start of tool 2; on both
+    sides it extends 3 cm beyond the region.
     """
     own = -np.array(REAL_STARTS)[:, XY]
     (depth, width), (rows, columns) = GRID_EXTENT, GRID_SHAPE
@@ -343,7 +343,7 @@ def _robot_trials() -> RobotTrials:
 
 
 def _on_an_arm(num_slots: int, arm: str) -> DeployedSimulator:
-    """Return a simulator of `num_slots` cubes whose tools are held by `arm`, seen from the side."""
+    """Return a simulator of `num_slots` cubes with tools held by `arm`, viewed from the side."""
     carrier = arm_carrier(arm, ARM_BASE, CLOCK)
     simulator = _FetchCubeSimulator(num_slots, STATE.size, CLOCK, carrier)
     simulator.camera, simulator.roofless = ARM_CAMERA, True
@@ -354,24 +354,24 @@ class _FetchCubeSimulator(BulletSimulator):
     """Table, overhang, cube and tool, one of each per slot."""
 
     camera = Camera(eye=(0.0, 0.56, 1.4), target=(0.0, 0.56, 0.0), up=(0.0, 1.0, 0.0), near=1.4 - 0.07)
-    """Straight from above, with the overhang cut away."""
+    """Directly from above; the near plane cuts the overhang away."""
     room = ((-1.5, 1.5), (-1.0, 2.0), (0.4 * CUBE_SIZE, CUBE_SIZE))
     tool_friction = TOOL_FRICTION
 
     def __init__(self, num_slots: int, state_size: int, clock: Clock, carrier: Carrier | None = None) -> None:
         super().__init__(num_slots, state_size, num_bodies=1, clock=clock, carrier=carrier)
         self.roofless = False
-        """Whether pictures leave the overhang out, which a camera at the side would not see beneath."""
+        """Whether pictures omit the overhang, which hides the cube from a camera at the side."""
         self.start = np.zeros((num_slots, 2))
         self.distance = np.zeros(num_slots)
         self.low = np.tile([HOLD_X[0], HOLD_Y[0], 0.0], (num_slots, 1))
-        """(B, 3): lowest place of the held point, which depends on the tool's height."""
+        """(B, 3): lower bounds of the held point, which depend on the tool's height."""
         self.high = np.array([HOLD_X[1], HOLD_Y[1], HOLD_TOP])
         self.points = np.zeros((num_slots, NUM_LINKS + 1, 2))
-        """(B, 4, 2): the chain from the held point; all zero before there is a tool."""
+        """(B, 4, 2): points of the chain relative to the held point; zero before the design step."""
 
     def begin(self, slots: Slots, instances: Floats) -> None:
-        """Put cubes where `instances` (b, I) say and held points at their start."""
+        """Put cubes at `instances` (b, I) and held points at their start."""
         self.forget(slots)
         self.start[slots] = instances
         self.pose[slots] = HOLD_START
@@ -410,7 +410,7 @@ class _FetchCubeSimulator(BulletSimulator):
         self._write_state(slots)
 
     def step(self, slots: Slots, controls: Floats) -> None:
-        """Move the held points by `controls` (b, C) in one control step and reward the cubes' way to the base."""
+        """Move the held points by `controls` (b, C) in one control step and reward the cubes' approach to the base."""
         pose = self.pose[slots]
         length = np.maximum(1.0, np.sqrt((controls[:, IN_PLANE] ** 2).sum(axis=1)))
         move = STEP_LENGTH * controls
@@ -443,7 +443,8 @@ class _FetchCubeSimulator(BulletSimulator):
         cube, pose = self.bodies[slots, 0], self.pose[slots]
         place, velocity = cube[:, PLACE][:, XY], cube[:, VELOCITY][:, XY]
         x, y, z, w = cube[:, ROTATION].T
-        # A cube looks the same after a quarter turn, and so does four times its angle about the vertical.
+        # A cube looks the same after a quarter turn; sine and cosine of four times its angle about the vertical are
+        # also the same.
         turn = 4.0 * np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         distance = np.sqrt((place**2).sum(axis=1))
         state = self.state
@@ -459,7 +460,7 @@ class _FetchCubeSimulator(BulletSimulator):
 
 
 def link_turns(boxes: Boxes) -> Floats:
-    """Return how far each link is turned from the y axis, rad, (b, K); links turn about the vertical alone."""
+    """Return each link's angle from the y axis, rad, (b, K); links rotate only about the vertical."""
     return 2.0 * np.arctan2(boxes.rotations[..., 2], boxes.rotations[..., 3])
 
 
@@ -479,10 +480,9 @@ def chain_boxes(designs: Floats) -> tuple[Floats, Boxes]:
 
 
 def start_shift(boxes: Boxes, offset: Floats) -> Floats:
-    """Return how far (b,) tools must start from `HOLD_START` along x to be clear of their cubes, in m.
+    """Return the shifts (b,) along x from `HOLD_START` at which tools are clear of their cubes, m.
 
-    `offset` (b, 2) leads from a cube's centre to the held point, m. Along x, a link is too close over one interval; the
-    held point stays inside its box.
+    `offset` (b, 2) is the displacement from a cube's centre to the held point, m. The held point stays inside its box.
     """
     return nearest_clear_shift(*_blocked_shifts(boxes, offset), (HOLD_X[0] - HOLD_START[0], HOLD_X[1] - HOLD_START[0]))
 
@@ -490,9 +490,9 @@ def start_shift(boxes: Boxes, offset: Floats) -> Floats:
 def _blocked_shifts(boxes: Boxes, offset: Floats) -> tuple[Floats, Floats]:
     """Return the ends (b, K) of each link's interval of shifts at which it is too close to the cube; NaN if none.
 
-    Seen from above, link and cube are rectangles. Two rectangles are apart if and only if their shadows on one of the
-    four directions of their sides are (separating axes). Shadows on a direction are too close over one interval of
-    shifts, so the link is too close over what the four intervals have in common.
+    Seen from above, link and cube are rectangles. Two rectangles are apart if and only if their projections on at least
+    one of the four directions of their sides are apart (separating axis theorem). The projections on one direction are
+    too close for one interval of shifts, so the link is too close on the intersection of the four intervals.
     """
     turn = link_turns(boxes)
     across = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
@@ -508,25 +508,25 @@ def _blocked_shifts(boxes: Boxes, offset: Floats) -> tuple[Floats, Floats]:
 def _close_shadows(
     direction: Floats, sides: tuple[Floats, Floats], boxes: Boxes, centre: Floats
 ) -> tuple[Floats, Floats]:
-    """Return the ends (b, K) of the interval of shifts at which the shadows of link and cube are too close.
+    """Return the ends (b, K) of the interval of shifts at which the projections of link and cube are too close.
 
     Args:
-        direction: unit vectors (b, K, 2) on which the shadows fall.
+        direction: unit vectors (b, K, 2) of the projection.
         sides: unit vectors (b, K, 2) across and along the links.
-        boxes: of the tools.
-        centre: of the links, seen from the cube's centre (b, K, 2), m.
+        boxes: boxes of the tools.
+        centre: centres of the links relative to the cube's centre (b, K, 2), m.
     """
-    # Half the length of the cube's shadow and of the link's, and what must be free between the two.
+    # Half the length of the cube's projection and of the link's, and the clearance between the two.
     reach = START_CLEARANCE + 0.5 * CUBE_SIZE * np.abs(direction).sum(axis=-1)
     for axis, side in enumerate(sides):
         reach = reach + boxes.half_extents[..., axis] * np.abs((direction * side).sum(axis=-1))
     middle = (direction * centre).sum(axis=-1)
-    # A shift s along x moves the link's shadow by slope * s.
+    # A shift s along x moves the link's projection by slope * s.
     slope = direction[..., 0]
     tilted = np.abs(slope) > 1e-9
     divisor = np.where(tilted, slope, 1.0)
     ends = np.stack([(-reach - middle) / divisor, (reach - middle) / divisor])
-    # On a direction square to x it moves nothing: the shadows are too close at every shift, or at none (NaN, which the
-    # caller's maximum and minimum pass on).
+    # On a direction perpendicular to x, shifts have no effect: the projections are too close at every shift, or at none
+    # (NaN, which the caller's maximum and minimum propagate).
     always = np.where(np.abs(middle) < reach, np.inf, np.nan)
     return np.where(tilted, ends.min(axis=0), -always), np.where(tilted, ends.max(axis=0), always)

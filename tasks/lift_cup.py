@@ -70,9 +70,9 @@ ANGLE_MAX: Annotated[float, Given("degrees", PAPER, "tool_angle_max")] = 30.0
 HANDLE_HALF_EXTENTS: Annotated[Floats, Given("m", "ours; the paper says that it is fixed")] = np.array(
     [0.01, 0.05, 0.01]
 )
-"""Of the handle."""
+"""Half extents of the handle."""
 BAR_THICKNESS: Annotated[float, Given("m", OURS)] = 0.02
-"""Of the cross bar, along y and z."""
+"""Thickness of the cross bar, along y and z."""
 PRONG_START = 2.0 * HANDLE_HALF_EXTENTS[1] + BAR_THICKNESS
 """Distance of the prongs' rear ends from the held end, along y, m."""
 TOOL_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.002
@@ -80,10 +80,10 @@ TOOL_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.002
 WORKSPACE: Annotated[Box, Given("m", OURS)] = Box.of(
     held_x=(-0.15, 0.15, "m"), held_y=(1.1, 1.75, "m"), held_z=(0.0, 0.7, "m")
 )
-"""Where the held end may go; a tool's lowest point limits z further."""
+"""Range of the held end; a tool's lowest point limits z further."""
 MAX_MOVE: Annotated[float, Given("m", OURS, "control_action_scale")] = 0.02
-"""Longest way of the held end in a control step: 0.48 m/s, too slow to bat a cup away; the paper's scale would be
-2.4 m/s."""
+"""Largest displacement of the held end in a control step: 0.48 m/s, too slow to knock a cup away; the paper's scale
+would be 2.4 m/s."""
 
 CUP_UNIT: Annotated[float, Given("m", OURS)] = 0.18
 """Width and height of a cup of scale 1: rims of all widths fit between prongs of the design space."""
@@ -92,23 +92,23 @@ CUP_WIDTHS: Annotated[tuple[float, float], Given("1", f"{REAL_ROBOT}: range of i
 CUP_HEIGHTS: Annotated[tuple[float, float], Given("1", f"{REAL_ROBOT}: range of its real cups")] = (0.6, 0.9)
 """Smallest and largest scale of a cup's height."""
 CUP_START_Y: Annotated[float, Given("m", OURS)] = 1.65
-"""Where cups stand, x being 0: no fork reaches a rim at the start."""
+"""Start of cups along y, with x = 0: no fork reaches a rim at the start."""
 CUP_MASS: Annotated[float, Given("kg", OURS)] = 0.2
-"""Of a cup."""
+"""Mass of a cup."""
 WALL: Annotated[float, Given("m", OURS)] = 0.008
 """Thickness of walls and bottom."""
 RIM_WIDTH: Annotated[float, Given("m", OURS)] = 0.02
-"""How far the rim stands out from the walls: the play of a prong between wall and the rim's edge."""
+"""Width of the rim beyond the walls: the play of a prong between the wall and the rim's edge."""
 RIM_THICKNESS: Annotated[float, Given("m", OURS)] = 0.008
-"""Of the rim."""
+"""Thickness of the rim."""
 WALL_GAP: Annotated[float, Given("m", OURS)] = 0.002
-"""Walls end this high above the bottom's underside: a cup on the table then has 4 contacts instead of 20."""
+"""Gap between the walls and the underside of the bottom: a cup on the table then has 4 contacts instead of 20."""
 CUP_FRICTION: Annotated[float, Given("1", OURS)] = 0.25
-"""Of the cup; table and tool have 1, and the engine multiplies."""
+"""Friction of the cup; table and tool have 1, and the engine multiplies the two."""
 TABLE_TOP: Annotated[tuple[tuple[float, float], tuple[float, float]], Given("m", OURS)] = (-0.5, 0.5), (0.8, 2.4)
-"""Ends of the table along x and y."""
+"""Range of the table along x and y."""
 TABLE_HALF_THICKNESS: Annotated[float, Given("m", OURS)] = 0.1
-"""Of the table."""
+"""Half thickness of the table."""
 
 SUCCESS_HEIGHT: Annotated[float, Given("m", REAL_ROBOT, "lift_cup_height")] = 0.4
 """The cup's lowest corner must rise above this."""
@@ -120,15 +120,15 @@ FALLEN_HEIGHT: Annotated[float, Given("m", OURS)] = -0.05
 """A cup whose centre is below this has fallen off the table."""
 
 LIFT_WEIGHT: Annotated[float, Given("1/m", OURS)] = 10.0
-"""Of the height in the reward."""
+"""Weight of the cup's height in the reward."""
 FIT_WEIGHT: Annotated[float, Given("1/m", OURS)] = 4.0
-"""Of the distance between prongs and rim in the reward."""
+"""Weight of the distance between prongs and rim in the reward."""
 FIT_LENGTH: Annotated[float, Given("m", OURS)] = 0.03
-"""Within this distance the prongs count as fitting the rim."""
+"""Length scale within which the prongs fit the rim."""
 PLAY: Annotated[float, Given("m", OURS)] = 0.25 * RIM_WIDTH
 """Prongs this far from the middle of the rim still fit perfectly."""
 START_POTENTIAL: Annotated[float, Given("1", OURS)] = -1.0
-"""Of every episode's start: the one of prongs 0.25 m away."""
+"""Potential at every episode's start: that of prongs 0.25 m away."""
 SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
 """Added in every control step."""
 SUCCESS_REWARD: Annotated[float, Given("1", PAPER, "success_reward")] = 10.0
@@ -142,12 +142,12 @@ REAL_CUPS: Annotated[tuple[tuple[float, float], ...], Given("1", REAL_ROBOT, "li
 )
 """Scales of width and height of the cups for which the paper's printed tools were designed."""
 ARM_BASE: Annotated[Triple, Given("m", OURS)] = (0.0, 1.0, 0.3)
-"""Where a robot's base stands: 0.3 m above the table and 0.65 m before the cup.
+"""Position of a robot's base: 0.3 m above the table and 0.65 m in front of the cup.
 
-From there a Panda reaches from below the rims up to the lifted cup; the paper does not say where its own stood.
+From there a Panda reaches from below the rims to the lifted cup; the paper does not give its robot's position.
 """
 ARM_CAMERA = Camera(eye=(1.5, 1.45, 0.7), target=(0.0, 1.3, 0.42))
-"""Sees arm and cup in deployment."""
+"""View of arm and cup in deployment."""
 
 HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 150
 """Time limit."""
@@ -158,7 +158,7 @@ PHYSICS_PERIOD: Annotated[float, Given("s", "PyBullet's own")] = 1.0 / 240.0
 CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
 
 FORK_GRAPH = ToolGraph(num_nodes=4, edges=((0, 1), (1, 2), (1, 3)), parameter_nodes=(1, 2, 2, 2, 2))
-"""Handle, cross bar, left and right prong; the right prong is the left one's mirror image and has no own parameters."""
+"""Handle, cross bar, left and right prong; the right prong mirrors the left one and has no parameters."""
 
 
 (_WIDTH, _LENGTH, _HEIGHT) = ((2.0 * low, 2.0 * high, "m") for low, high in zip(BOX_MIN, BOX_MAX, strict=True))
@@ -207,49 +207,48 @@ CUP_TURN = STATE.index("cup_y_axis_x")
 class LiftCup(Task):
     """Lift a cup of given width and height from the table (paper, appendix "Environment Details").
 
-    The tool is a fork: a handle, a cross bar and two prongs. The robot holds the end of the handle, moves it and never
-    turns it. The cup is square, closed at the bottom and has a rim that stands out. Prongs that pass on both sides of
-    it take it under the rim. Prongs closer together than the cup is wide do not pass the walls; prongs further apart
-    than the rim's edges miss it; short prongs, and prongs that hang down, let the cup tip. So the fork must match the
-    cup: each prong has the rim's width of play, and no fork lifts two cups whose widths differ by more than twice that.
+    The tool is a fork: a handle, a cross bar and two prongs. The robot holds the end of the handle and moves it without
+    rotation. The cup is square, closed at the bottom, and has a protruding rim. Prongs on both sides of the cup lift it
+    by the rim. Prongs closer together than the cup is wide do not pass the walls; prongs further apart than the rim's
+    edges miss it; short prongs, and prongs that slope down, let the cup tip. So the fork must match the cup: each prong
+    has the rim's width of play, and no fork lifts two cups whose widths differ by more than twice that.
 
     Action space
         Design, 5: distance between the prongs' inner faces (m), tilt (rad), width, length and height of the prongs (m)
-        (paper; the handle is fixed, both prongs are alike). Control, 3: change of the held end's place x, y, z in a
-        control step (m) (paper; range ours); its length is limited, not each entry.
+        (paper; the handle is fixed, and both prongs are the same). Control, 3: displacement x, y, z of the held end in
+        a control step (m) (paper; range ours); its length is limited, not each entry.
 
     Observation
-        State, 19: place of the held end, way of the cup from its start, way from the point midway between the prongs to
-        the cup's centre of mass, x, y, z of each (m); height of the rim's underside above the prongs' top at their
-        middle, and free width between each prong and the cup's walls (m); vertical parts of the cup's three axes, and
-        how far its y axis points along x; velocity of the cup x, y, z (m/s). Goal, 2: scales of the cup's width and
-        height. Then the design and the phase. Before there is a tool, all that concerns prongs is 0.
+        State, 19: position of the held end, displacement of the cup from its start, displacement from the point midway
+        between the prongs to the cup's centre of mass, x, y, z of each (m); height of the rim's underside above the
+        prongs' top at their middle, and free width between each prong and the cup's walls (m); vertical components of
+        the cup's three axes, and the x component of its y axis; velocity of the cup x, y, z (m/s). Goal, 2: scales of
+        the cup's width and height. Then the design and the phase. Before the tool exists, all entries on prongs are 0.
 
     Design space
-        The paper's table gives sizes, read as half extents, PyBullet's own measure (ours), but no range for the
-        distance of the prongs; ours is that of their length. A positive tilt raises the tips; prongs turn about their
-        rear ends, in front of the cross bar. The right prong, node 3, is the left one's mirror image and has no
-        parameters.
+        The paper's table gives sizes, which we read as half extents, PyBullet's convention, but no range for the
+        distance of the prongs; ours is that of their length. A positive tilt raises the tips; prongs rotate about their
+        rear ends, in front of the cross bar. The right prong, node 3, mirrors the left one and has no parameters.
 
     Goal space
         Scales of the cup's width and height, uniform, over the range of the paper's four real cups.
 
     Reward
-        The change of a potential, less the paper's slack, and the paper's bonus on success. The potential grows as
-        prongs come to fit the rim and as the cup is lifted. The four points under the rim are on the left and on the
-        right, in the middle of the rim, a quarter of the width before and behind the cup's centre, and move with the
-        cup. Their distance from the top edge of that side's prong has a part sideways, some of which is free, a part
-        along the prong beyond its ends, and a part in height. The potential starts at the same value whatever the tool,
-        so a tool that fits earns its fit in the first step. An episode's return is below 16.
+        The change of a potential, plus the paper's slack (negative) and the paper's bonus on success. The potential
+        increases as the prongs fit the rim better and as the cup is lifted. Four points under the rim, fixed to the
+        cup, are in the middle of the rim's left and right sides, a quarter of the width in front of and behind the
+        cup's centre. Their distance from the top edge of the prong on their side has a sideways part, with some play, a
+        part along the prong beyond its ends, and a vertical part. The potential starts at the same value for every
+        tool, so a tool that fits is rewarded for its fit in the first step. An episode's return is below 16.
 
     Starting state
-        The cup at rest and the held end where the paper's table has it. Tools that would then be too low start as much
-        higher as they need (ours). No fork reaches a rim at the start.
+        The cup at rest and the held end at the paper's position. Tools that would be too low there start higher, by as
+        much as needed (ours). No fork reaches a rim at the start.
 
     Episode end
-        Success when the cup's lowest corner is high enough and the cup upright; failure when the cup has tipped over or
-        fallen from the table; or the time limit. The lowest corner follows from the cup's rotation, since the centre of
-        a tipped cup is higher than it looks.
+        Success when the cup's lowest corner is high enough and the cup is upright; failure when the cup has tipped over
+        or fallen off the table; or the time limit. The lowest corner is computed from the cup's rotation, since the
+        height of the centre is misleading for a tipped cup.
     """
 
     name = "lift_cup"
@@ -290,12 +289,12 @@ class LiftCup(Task):
     soundness = Soundness(overlap=WALL, speed=4.0, outcome_change=0.01)
 
     def material(self, designs: Floats) -> Floats:
-        """Return the used share of the largest volume of prongs and cross bar for designs (b, D) in their units."""
+        """Return the volume of prongs and cross bar as a fraction of the largest, for designs (b, D) in their units."""
         used: Floats = _volume(designs) / _volume(self.design_space.bounds[1][None])
         return used
 
     def effort(self, controls: Floats) -> Floats:
-        """Return the share of the longest way of the held end for controls (b, C) in [-1, 1]."""
+        """Return the displacement of the held end as a fraction of the largest, for controls (b, C) in [-1, 1]."""
         way: Floats = np.minimum(1.0, np.linalg.norm(controls, axis=1))
         return way
 
@@ -304,8 +303,8 @@ class LiftCup(Task):
         return box_parts(fork_boxes(design[None]))
 
     def script(self) -> Behaviour:
-        """Return a script that puts the prongs beside the cup and lifts."""
-        from ._scripts.lift_cup import LiftCupScript  # here, since that file reads this one
+        """Return a script that moves the prongs to the sides of the cup and lifts."""
+        from ._scripts.lift_cup import LiftCupScript  # imported here because that file imports this one
 
         return LiftCupScript(self)
 
@@ -332,7 +331,7 @@ def _robot_trials() -> RobotTrials:
 
 
 def _on_an_arm(num_slots: int, arm: str) -> DeployedSimulator:
-    """Return a simulator of `num_slots` cups whose forks are held by `arm`, seen from the side."""
+    """Return a simulator of `num_slots` cups with forks held by `arm`, viewed from the side."""
     carrier = arm_carrier(arm, ARM_BASE, CLOCK)
     simulator = _LiftCupSimulator(num_slots, STATE.size, CLOCK, carrier)
     simulator.camera = ARM_CAMERA
@@ -364,21 +363,23 @@ def fork_boxes(designs: Floats) -> Boxes:
 
 
 def prong_middles(designs: Floats) -> Floats:
-    """Return the points (b, 3) midway between the two prongs' centres, from the held end."""
+    """Return the points (b, 3) midway between the two prongs' centres, relative to the held end."""
     _, tilt, _, length, _ = designs.T
     return np.stack([0.0 * tilt, PRONG_START + 0.5 * length * np.cos(tilt), 0.5 * length * np.sin(tilt)], axis=1)
 
 
 def lowest_points(designs: Floats) -> Floats:
-    """Return the height (b,) of the lowest point of tools with designs (b, D), from the held end; not positive."""
+    """Return the height (b,) of the lowest point of designs (b, D), relative to the held end; not positive."""
     _, tilt, _, length, height = designs.T
+    # A prong rotates about its rear end: the lower end is the tip if it slopes down, else the rear. Half its height,
+    # tilted as well, reaches below that.
     prong = np.minimum(0.0, length * np.sin(tilt)) - 0.5 * height * np.cos(tilt)
     lowest: Floats = np.minimum(prong, -max(HANDLE_HALF_EXTENTS[2], 0.5 * BAR_THICKNESS))
     return lowest
 
 
 class _Cups:
-    """Boxes, centre of mass and inertia of cups of a width (b,) and a height (b,), in m and kg."""
+    """Boxes, centre of mass and inertia of cups with widths (b,) and heights (b,), in m and kg."""
 
     def __init__(self, width: Floats, height: Floats) -> None:
         half, rim = 0.5 * width, 0.5 * width + RIM_WIDTH
@@ -403,21 +404,24 @@ class _Cups:
         self.half_extents: Floats = np.moveaxis(np.array(extents), -1, 0)
         """(b, K, 3)"""
         self.centres: Floats = np.moveaxis(np.array(places), -1, 0)
-        """(b, K, 3), from the centre of mass."""
+        """(b, K, 3), relative to the centre of mass."""
         volumes = self.half_extents.prod(axis=2)
+        # The mass is divided among the boxes by volume, as if all had the same density.
         masses = CUP_MASS * volumes / _sum_of_boxes(volumes)[:, None]
         self.centre_height: Floats = _sum_of_boxes(masses * self.centres[..., 2]) / CUP_MASS
-        """(b,) of the centre of mass above the cup's underside."""
+        """(b,) height of the centre of mass above the cup's underside."""
         self.centres[..., 2] -= self.centre_height[:, None]
+        # Sum of m x^2 per axis: half^2 / 3 of each box about its own centre, plus its offset (parallel axes). The
+        # moment about an axis is the sum over the two other axes. By symmetry in x and y, the axes are principal.
         squares = _sum_of_boxes(masses[..., None] * (self.half_extents**2 / 3.0 + self.centres**2))
         self.inertia: Floats = squares.sum(axis=1, keepdims=True) - squares
-        """(b, 3) about the cup's axes."""
+        """(b, 3) moments of inertia about the cup's axes."""
 
 
 def _sum_of_boxes(values: Floats) -> Floats:
-    """Return the sum of values (b, K, ...) over boxes, one after the other.
+    """Return the sum of values (b, K, ...) over boxes in a fixed order.
 
-    NumPy's own sum of 8 and more values takes another order, and rounds otherwise, in one cup than in many.
+    NumPy's sum of 8 or more values uses a different order for one cup than for many, and thus rounds differently.
     """
     total = np.zeros_like(values[:, 0])
     for box in range(values.shape[1]):
@@ -431,14 +435,14 @@ class _LiftCupSimulator(BulletSimulator):
     camera = Camera(eye=(0.75, 0.85, 0.55), target=(0.0, 1.55, 0.25))
     room = (*TABLE_TOP, (0.0, 1.0))
     _SIDES = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
-    """Left and right, near and far: the four points under the rim."""
+    """Signs along x and y of the four points under the rim."""
 
     def __init__(self, num_slots: int, state_size: int, clock: Clock, carrier: Carrier | None = None) -> None:
         super().__init__(num_slots, state_size, num_bodies=1, clock=clock, carrier=carrier)
         self.size = np.zeros((num_slots, 2))
         """(B, 2): width and height of the cup, m."""
         self.centre_height = np.zeros(num_slots)
-        """(B,) of the cup's centre of mass above its underside, m."""
+        """(B,) height of the cup's centre of mass above its underside, m."""
         self.cup_start = np.zeros((num_slots, 3))
         self.designs = np.zeros((num_slots, DESIGN.size))
         self.prong_middle = np.zeros((num_slots, 3))
@@ -448,7 +452,7 @@ class _LiftCupSimulator(BulletSimulator):
         self._cups: dict[int, tuple[list[list[float]], list[list[float]], list[float]]] = {}
 
     def begin(self, slots: Slots, instances: Floats) -> None:
-        """Put cups of the sizes that `instances` (b, I) say on their tables."""
+        """Put cups of the sizes of `instances` (b, I) on their tables."""
         self.forget(slots)
         size = CUP_UNIT * instances
         cups = _Cups(*size.T)
@@ -484,7 +488,7 @@ class _LiftCupSimulator(BulletSimulator):
         return [cup]
 
     def build(self, slots: Slots, designs: Floats) -> None:
-        """Add forks of `designs` (b, D), at the start or, if they would be too low there, higher."""
+        """Add forks of `designs` (b, D) at the start, or higher if they would be too low there."""
         self.designs[slots] = designs
         self.prong_middle[slots] = prong_middles(designs)
         self.lowest_hold[slots] = TOOL_CLEARANCE - lowest_points(designs)
@@ -494,7 +498,7 @@ class _LiftCupSimulator(BulletSimulator):
         self._observe(slots)
 
     def step(self, slots: Slots, controls: Floats) -> None:
-        """Move the held ends by `controls` (b, C) and reward cups that rise and prongs that come to fit."""
+        """Move the held ends by `controls` (b, C) and reward the lift of cups and the fit of prongs."""
         pose = self.pose[slots]
         length = np.linalg.norm(controls, axis=1, keepdims=True)
         low, high = (np.tile(bound, (len(slots), 1)) for bound in WORKSPACE.bounds)
@@ -514,17 +518,18 @@ class _LiftCupSimulator(BulletSimulator):
         self.potential[slots] = potential
 
     def mark(self, slot: int, marks: Marks) -> None:
-        """Draw a square at the height to which the cup must be lifted."""
+        """Draw a square at the height that the cup must reach."""
         x, y = 0.12 * np.array([[-1.0, 1.0, 1.0, -1.0, -1.0], [-1.0, -1.0, 1.0, 1.0, -1.0]])
         marks.line(np.column_stack([x, y + CUP_START_Y, np.full(5, SUCCESS_HEIGHT)]), COLOURS["goal"])
 
     def _observe(self, slots: Slots) -> Floats:
-        """Write state, outcome and both ends; return the reward's potential (b,)."""
+        """Write state, outcome, success and failure; return the reward's potential (b,)."""
         held, cup = self.pose[slots], self.bodies[slots, 0]
         width, height = self.size[slots].T
         place, turn = cup[:, PLACE], rotation_matrices(cup[:, ROTATION])
         axes = turn[:, 2]
-        # Corners of the underside are at (+-width / 2, +-width / 2, -centre_height); the lowest has both signs down.
+        # Corners of the underside are at (+-width / 2, +-width / 2, -centre_height) in the cup's frame. For the lowest,
+        # the signs make both terms negative, hence the absolute values.
         lowest = place[:, 2] - 0.5 * width * np.abs(axes[:, :2]).sum(axis=1) - self.centre_height[slots] * axes[:, 2]
         upright = axes[:, 2] > UPRIGHT
         lifted = np.where(upright, np.maximum(lowest, 0.0), 0.0)
@@ -548,6 +553,7 @@ class _LiftCupSimulator(BulletSimulator):
         state[slots, CUP_VELOCITY] = cup[:, VELOCITY]
 
         misfit = self._misfit(slots, place, turn, rim)
+        # The linear part leads to the rim from any distance; the exponential adds a steep bonus close to it.
         fit = np.exp(-misfit / FIT_LENGTH) - FIT_WEIGHT * misfit
         potential: Floats = fit.mean(axis=1) + LIFT_WEIGHT * np.minimum(lifted, SUCCESS_HEIGHT)
         return potential
@@ -555,8 +561,8 @@ class _LiftCupSimulator(BulletSimulator):
     def _misfit(self, slots: Slots, place: Floats, turn: Floats, rim: Floats) -> Floats:
         """Return the distances (b, 4) of points under the rim from the top edges of the prongs.
 
-        The points lie in the middle of the rim, left and right, a quarter of the cup's width before and behind its
-        centre. A distance has a part along x from the prong's inner face, less the play, one along y beyond the
+        The points are in the middle of the rim, left and right, a quarter of the cup's width in front of and behind its
+        centre. A distance has a part along x from the prong's inner face, minus the play, one along y beyond the
         prong's ends, and one along z from its top edge.
         """
         width = self.size[slots, 0]

@@ -51,7 +51,7 @@ EARLY = "scale of the first author's early scenes"
 TOOL_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([20.0, 10.0])
 """Where the held end starts."""
 START_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.25
-"""A tool that would start closer to the puck than this starts left or right of there, whichever is nearer."""
+"""A tool that would start closer to the puck than this is shifted to the left or right, whichever is nearer."""
 LENGTH_INIT: Annotated[tuple[float, float, float], Given("m", PAPER, "tool_length_init")] = (2.0, 2.0, 2.0)
 """Of the links, from which the design space is made: length = initial length (1 + ratio)."""
 LENGTH_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_length_ratio")] = (-0.5, 0.5)
@@ -63,16 +63,16 @@ ANGLE_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_angle_ratio"
 FIRST_LINK_ANGLE: Annotated[float, Given("rad", OURS)] = np.pi
 """The first link points left and passes above the puck."""
 WORKSPACE: Annotated[Box, Given("m", OURS)] = Box.of(base_x=(14.0, 24.0, "m"), base_y=(6.5, 10.5, "m"))
-"""Where the held end may go: too low a place to lift a deep hook over the puck and use it on the other side."""
+"""Range of the held end: too low to lift a deep hook over the puck and use it on the other side."""
 MAX_SPEED: Annotated[float, Given("m/s", OURS)] = 6.0
 """Largest speed of the held end along each axis: a tenth of the puck's radius in a physics step."""
 
 PUCK_START: Annotated[Floats, Given("m", OURS)] = np.array([16.0, 8.25])
 """Where the puck starts, at rest."""
 PUCK_RADIUS: Annotated[float, Given("m", EARLY)] = 1.0
-"""Of the puck."""
+"""Radius of the puck."""
 PUCK_DENSITY: Annotated[float, Given("kg/m^2", EARLY)] = 1.0
-"""Of the puck."""
+"""Density of the puck."""
 PUCK_DECELERATION: Annotated[float, Given("m/s^2", OURS)] = 12.0
 """Friction of the table slows a sliding puck down at this rate: from full tool speed to rest within 1.5 m."""
 CONTACT_FRICTION: Annotated[float, Given("1", EARLY)] = 0.3
@@ -85,7 +85,7 @@ GOAL_RADIUS: Annotated[float, Given("m", EARLY)] = 1.5
 REST_SPEED: Annotated[float, Given("m/s", OURS)] = 0.2
 """A puck slower than this is at rest."""
 REST_STEPS: Annotated[int, Given("control steps", OURS)] = 3
-"""How long the puck must rest at the goal."""
+"""Number of consecutive steps for which the puck must rest at the goal."""
 SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
 """Added in every control step."""
 SUCCESS_REWARD: Annotated[float, Given("1", "ours; the paper lists one for its 3D tasks only")] = 1.0
@@ -121,39 +121,40 @@ PUCK_BODY, TOOL_BODY = 0, 1
 
 
 class Push(Task):
-    """Push a round puck with the tool such that it stops at the goal (paper, appendix "Environment Details").
+    """Push a round puck with the tool so that it stops at the goal (paper, appendix "Environment Details").
 
-    Seen from above, a robot holds the free end of a chain of three links and moves it without turning it. At the start
-    the chain passes above the puck, and goals are all around it. A link pushes only away from itself, so the goal
-    decides where a link must stand: above the puck for goals below, to its right for goals on the left, on its left, as
-    a hook, for goals on the right, and beneath it for goals above. The held end stays in a box that is too low to lift
-    a deep hook over the puck, so a tool that serves one side hardly serves the other.
+    Seen from above, a robot holds the free end of a chain of three links and moves it without rotation. At the start
+    the chain passes above the puck, and goals are all around it. A link can only push away from itself, so the goal
+    determines where a link must be: above the puck for goals below, on its right for goals on the left, on its left, as
+    a hook, for goals on the right, and below it for goals above. The held end stays in a box that is too low to lift a
+    deep hook over the puck, so a tool for one side hardly works for the other.
 
     Action space
         Design, 5: lengths of the three links (m) and the two angles between them (rad) (paper). Control, 2: velocity of
         the held end along x and y (m/s) (ours).
 
     Observation
-        State, 10: place and velocity of the puck, place of the held end, way from the puck to the goal and from the
-        held end to the puck, x and y of each (m, m/s). Goal, 2: its place x, y (m). Then the design and the phase.
+        State, 10: position and velocity of the puck, position of the held end, displacement from the puck to the goal
+        and from the held end to the puck, x and y of each (m, m/s). Goal, 2: its position x, y (m). Then the design and
+        the phase.
 
     Design space
         Length = initial length (1 + ratio), angle = scale * ratio (our reading of the paper's table). The table has
         three angles; a chain of three links has two joints, and the third angle is not used.
 
     Goal space
-        Places in a ring around the puck's start, uniform in area, in every direction (ours).
+        Positions in a ring around the puck's start, in all directions, uniform in area (ours).
 
     Reward
-        The share of the way by which the puck came nearer to the goal, less the paper's slack, and a bonus on success.
-        An episode's return is below 2.
+        The decrease of the puck's distance from the goal, as a fraction of the initial distance, plus the paper's slack
+        (negative) and a bonus on success. An episode's return is below 2.
 
     Starting state
-        The puck at rest and the held end where the paper's table has it, the same for every goal. A tool that would
-        then be on the puck starts at the nearest place to the left or right of there that is clear of it (ours).
+        The puck at rest and the held end at the paper's position, the same for every goal. A tool that would overlap
+        the puck there starts at the nearest clear position to the left or right (ours).
 
     Episode end
-        Success when the puck has come to rest at the goal, or the time limit.
+        Success when the puck comes to rest at the goal, or the time limit.
     """
 
     name = "push"
@@ -183,12 +184,14 @@ class Push(Task):
     success_steps = REST_STEPS
 
     outcome = Quantity("distance from puck to goal", "m")
-    # A puck between two links at once leaves up to a fifth faster than they move, until the contact solver has both.
+    # A puck squeezed between two links can leave up to a fifth faster than they move, before the contact solver
+    # converges.
     soundness = Soundness(overlap=LINK_HALF_WIDTH, speed=1.25 * np.sqrt(2.0) * MAX_SPEED, outcome_change=0.1)
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
         """Return (count, I) goals, uniform in the area of the ring around the puck."""
         near, far = GOAL_DISTANCE
+        # Area grows with the square of the distance, so the square is drawn uniformly.
         distance = np.sqrt(rng.uniform(near**2, far**2, size=count))
         angle = rng.uniform(-np.pi, np.pi, size=count)
         return PUCK_START + distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -201,13 +204,16 @@ class Push(Task):
         return inside
 
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
-        """Return which goals (b, I) are in the two patches, above and below the puck, that cover `fraction` of them.
+        """Return which goals (b, I) are in the two patches, above and below the puck, with `fraction` of the ring.
 
-        A patch is a sector of the ring, centred in angle and in area and scaled alike in both (ours, after the paper's
-        two patches of fetch cube).
+        A patch is a sector of the ring, centred in angle and in area, with the same scale in both (ours, after the
+        paper's two patches of fetch cube).
         """
         near, far = GOAL_DISTANCE
         offset = instances - PUCK_START
+        # Goals are uniform in these two coordinates, both in [0, 1]: the area inside of the goal, and the absolute
+        # angle. Folding the angle puts the two patches on top of each other, so a square with side sqrt(fraction) has
+        # the share `fraction` of all goals.
         area = ((offset**2).sum(axis=1) - near**2) / (far**2 - near**2)
         turn = np.abs(np.arctan2(offset[:, 1], offset[:, 0])) / np.pi
         reach = 0.5 * np.sqrt(fraction)
@@ -215,11 +221,11 @@ class Push(Task):
         return result
 
     def material(self, designs: Floats) -> Floats:
-        """Return the used share of the largest total link length for designs (b, D) in their units."""
+        """Return the total link length as a fraction of the largest, for designs (b, D) in their units."""
         return chain_material(designs, self.design_space)
 
     def effort(self, controls: Floats) -> Floats:
-        """Return the share of the largest speed of the held end for controls (b, C) in [-1, 1]."""
+        """Return the speed of the held end as a fraction of the largest, for controls (b, C) in [-1, 1]."""
         speed: Floats = np.linalg.norm(controls, axis=1) / np.sqrt(controls.shape[1])
         return speed
 
@@ -228,8 +234,8 @@ class Push(Task):
         return chain_parts(chain_points(design[None], FIRST_LINK_ANGLE)[0], LINK_HALF_WIDTH)
 
     def script(self) -> Behaviour:
-        """Return a script that pulls or pushes the puck with whichever part of a tool lies behind it."""
-        from ._scripts.push import PushScript  # here, since that file reads this one
+        """Return a script that pulls or pushes the puck with the part of a tool that is behind it."""
+        from ._scripts.push import PushScript  # imported here because that file imports this one
 
         return PushScript(self)
 
@@ -251,7 +257,7 @@ class _PushSimulator(PlanarSimulator):
         self.tools: list[pymunk.Body | None] = [None] * num_slots
 
     def begin(self, slots: Slots, instances: Floats) -> None:
-        """Put pucks and held ends at their start and the goals where `instances` (b, I) say."""
+        """Put pucks and held ends at their start, and goals at `instances` (b, I)."""
         self.forget(slots)
         self.goal[slots] = instances
         self.start_distance[slots] = np.linalg.norm(PUCK_START - instances, axis=1)
@@ -271,10 +277,13 @@ class _PushSimulator(PlanarSimulator):
         """Return the scene of one episode: puck, table friction, tool."""
         space = pymunk.Space()
         mass = PUCK_DENSITY * np.pi * PUCK_RADIUS**2
-        puck = pymunk.Body(mass, float("inf"))  # A round puck's spin changes nothing that matters here.
+        puck = pymunk.Body(mass, float("inf"))  # infinite moment: the spin of a round puck does not matter here
         puck.position = tuple(PUCK_START.tolist())
         disc = pymunk.Circle(puck, PUCK_RADIUS)
-        disc.friction = 1.0  # pymunk multiplies the two frictions of a contact.
+        disc.friction = 1.0  # pymunk multiplies the two friction coefficients of a contact
+        # Coulomb friction with a table that pymunk, seen from above, does not have: a joint that drags the puck's
+        # velocity to zero with a limited force. Without bias it corrects only the velocity and never pulls the puck
+        # back.
         table = pymunk.PivotJoint(space.static_body, puck, (0.0, 0.0), (0.0, 0.0))
         table.max_bias = 0.0
         table.max_force = mass * PUCK_DECELERATION
@@ -289,6 +298,8 @@ class _PushSimulator(PlanarSimulator):
         """Move the held ends by `controls` (b, C) for one control step and reward the pucks' progress."""
         period = self.clock.control_period
         base = self.bodies[slots, TOOL_BODY, PLACE]
+        # The workspace limits the target position, and the velocity follows from it: a kinematic tool cannot be stopped
+        # by a wall. A held end near the border then stops exactly at it.
         velocity = (np.clip(base + controls * (MAX_SPEED * period), *WORKSPACE.bounds) - base) / period
         for slot, pair in zip(slots.tolist(), velocity.tolist(), strict=True):
             tool = self.tools[slot]
@@ -323,31 +334,31 @@ class _PushSimulator(PlanarSimulator):
 
 
 def start_shift(points: Floats) -> Floats:
-    """Return how far (b,) from `TOOL_START` tools with chain `points` (b, 4, 2) start along x to be clear, in m."""
+    """Return the shifts (b,) along x from `TOOL_START` at which tools with chain `points` (b, 4, 2) are clear, m."""
     return nearest_clear_shift(*_blocked_shifts(points))
 
 
 def _blocked_shifts(points: Floats) -> tuple[Floats, Floats]:
     """Return the ends (b, 3) of each link's interval of shifts at which it is too close to the puck; NaN if none.
 
-    A link's core must keep out of the disc of radius `reach` around the puck. The shifts at which it does not are those
-    at which one of its ends lies in the disc, or its inner part crosses the disc; together they are one interval.
+    The middle line of a link must stay outside of the disc of radius `reach` around the puck. It is inside if one of
+    its ends is in the disc or its inner part crosses the disc; these shifts form one interval.
     """
     reach = PUCK_RADIUS + LINK_HALF_WIDTH + START_CLEARANCE
-    # The links as seen from the puck, without a shift.
+    # The ends of the links relative to the puck, without a shift.
     start, end = points[:, :-1] + TOOL_START - PUCK_START, points[:, 1:] + TOOL_START - PUCK_START
     lows, highs = [], []
     for at in (start, end):
-        # An end moves along the chord that the disc cuts out of its height; above or below the disc there is none.
+        # Shifted along x, an end is in the disc on the chord at its height; above or below the disc there is no chord.
         half = np.sqrt(np.where(np.abs(at[..., 1]) < reach, reach**2 - at[..., 1] ** 2, np.nan))
         lows.append(-at[..., 0] - half)
         highs.append(-at[..., 0] + half)
     length = np.linalg.norm(end - start, axis=-1)
     direction = (end - start) / length[..., None]
     normal = np.stack([-direction[..., 1], direction[..., 0]], axis=-1)
-    across = np.where(np.abs(normal[..., 0]) > 1e-9, normal[..., 0], np.nan)  # A level link does not move sideways.
+    across = np.where(np.abs(normal[..., 0]) > 1e-9, normal[..., 0], np.nan)  # a level link moves along itself
     for side in (-reach, reach):
-        # The link's line touches the disc at this shift; it counts if the point of contact is on the link itself.
+        # At this shift the link's line touches the disc; this counts only if the point of contact is on the link.
         shift = (side - (start * normal).sum(-1)) / across
         along = -((start * direction).sum(-1) + shift * direction[..., 0])
         touches = np.where((along > 0.0) & (along < length), shift, np.nan)

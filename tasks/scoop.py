@@ -52,9 +52,9 @@ PAPER = "paper, table of scoop"
 TEXT = 'paper, appendix "Environment Details"'
 
 TOOL_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([15.0, 10.0])
-"""Where the tool starts: x of its first joint and y of its lowest point (our reading)."""
+"""Start of the tool: x of its first joint and y of its lowest point (our reading)."""
 START_SHIFT: Annotated[float, Given("m", OURS)] = 0.4
-"""The first joint starts up to this far to the left or right of there."""
+"""Largest shift of the first joint's start to the left or right."""
 LENGTH_INIT: Annotated[tuple[float, float, float], Given("m", PAPER, "tool_length_init")] = (6.0, 3.0, 3.0)
 """Of the links, from which the design space is made: length = initial length (1 + ratio)."""
 LENGTH_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_length_ratio")] = (-0.7, 0.2)
@@ -64,51 +64,51 @@ ANGLE_SCALE: Annotated[float, Given("degrees", PAPER, "tool_angle_scale")] = 90.
 ANGLE_RATIO: Annotated[tuple[float, float], Given("1", PAPER, "tool_angle_ratio")] = (-0.1, 0.7)
 """Range of an angle's ratio."""
 FIRST_LINK_ANGLE: Annotated[float, Given("rad", OURS)] = -np.pi / 3.0
-"""The first link, the handle, points down to the right; the others curl up and make a ladle."""
+"""The first link, the handle, points down to the right; the others curl up and form a ladle."""
 LINK_HALF_WIDTH: Annotated[float, Given("m", OURS)] = 0.12
-"""Half the thickness of a link: a fifth of a ball's radius, so that a tool takes little room in the pile."""
+"""Half the thickness of a link: a fifth of a ball's radius, so that a tool displaces few balls in the pile."""
 TOOL_MASS: Annotated[float, Given("kg", OURS)] = 8.0
-"""Of the tool; its centre is the first joint."""
+"""Mass of the tool; its centre of mass is the first joint."""
 TOOL_MOMENT: Annotated[float, Given("kg m^2", OURS)] = 80.0
 """Moment of inertia about the first joint."""
 TOOL_FRICTION: Annotated[float, Given("1", OURS)] = 1.0
-"""Of the links' surface; pymunk multiplies the two frictions of a contact."""
+"""Friction of the links' surface; pymunk multiplies the two friction coefficients of a contact."""
 
 HAND_FORCE: Annotated[float, Given("N", OURS)] = 600.0
-"""The hand moves the tool with at most this force: an unstoppable tool would shoot balls out of the pile."""
+"""Largest force of the hand: an unstoppable tool would shoot balls out of the pile."""
 HAND_TORQUE: Annotated[float, Given("N m", OURS)] = 2400.0
-"""The hand turns the tool with at most this torque."""
+"""Largest torque of the hand."""
 MAX_SPEED: Annotated[float, Given("m/s", OURS)] = 1.5
-"""Largest speed of the first joint along each axis: out of the pile takes about 18 of the 30 steps."""
+"""Largest speed of the first joint along each axis: leaving the pile takes about 18 of the 30 steps."""
 MAX_ACCELERATION: Annotated[float, Given("m/s^2", OURS)] = 3.0
-"""The hand's velocity along an axis changes at most this fast: balls can hardly be shaken off."""
+"""Largest acceleration of the hand along each axis: balls can hardly be shaken off."""
 MAX_TURN: Annotated[float, Given("rad/s", OURS)] = 0.3
 """Largest angular velocity of the tool."""
 MAX_TILT: Annotated[float, Given("rad", OURS)] = 0.1
-"""The hand tilts the tool by at most this from its start: less than it takes to make balls slide."""
+"""Largest tilt of the tool from its start: too little to make balls slide."""
 
 NUM_BALLS: Annotated[int, Given("balls", TEXT)] = 40
-"""In the reservoir."""
+"""Number of balls in the reservoir."""
 BALL_RADIUS: Annotated[float, Given("m", OURS)] = 0.6
-"""Of a ball."""
+"""Radius of a ball."""
 BALL_DENSITY: Annotated[float, Given("kg/m^2", "scale of the first author's early scenes")] = 1.0
-"""Of a ball."""
+"""Density of a ball."""
 BALL_MASS = float(np.pi * BALL_RADIUS**2) * BALL_DENSITY
 BALL_FRICTION: Annotated[float, Given("1", OURS)] = 0.2
-"""Of the balls' surface. Balls do not turn, so they never roll: they rest on slopes of up to 11 degrees."""
+"""Friction of the balls' surface. Balls do not rotate, so they never roll: they rest on slopes of up to 11 degrees."""
 WALL_FRICTION: Annotated[float, Given("1", OURS)] = 0.5
-"""Of floor and walls."""
+"""Friction of floor and walls."""
 GRAVITY: Annotated[float, Given("m/s^2", OURS)] = 10.0
 """Of the scene."""
 DAMPING: Annotated[float, Given("1", OURS)] = 0.5
-"""Share of its velocity that a body keeps over 1 s; nothing falls faster than gravity / ln 2 = 14.4 m/s."""
+"""Fraction of its velocity that a body keeps over 1 s; nothing falls faster than gravity / ln 2 = 14.4 m/s."""
 
 CLEARANCE: Annotated[float, Given("m", OURS)] = 2.0 * BALL_RADIUS + LINK_HALF_WIDTH + 0.08
-"""Every joint and end of the tool keeps this far from floor and walls: a ball fits between unsqueezed."""
+"""Distance of every joint and end of the tool from floor and walls: a ball fits in between."""
 FLOOR: Annotated[float, Given("m", OURS)] = float(TOOL_START[1]) - CLEARANCE
-"""y of the floor: tools start as low as they may go."""
+"""y of the floor: tools start at their lowest allowed position."""
 RESERVOIR: Annotated[tuple[float, float], Given("m", OURS)] = (9.5, 24.0)
-"""x of the reservoir's walls: room for the widest tool at every start."""
+"""x of the reservoir's walls: the widest tool fits at every start."""
 RIM: Annotated[float, Given("m", OURS)] = 14.0
 """y of the upper ends of these walls: above the piles, which are about 4.8 m deep."""
 YARD: Annotated[tuple[float, float], Given("m", OURS)] = (6.0, 27.5)
@@ -120,31 +120,31 @@ LINE: Annotated[float, Given("m", OURS)] = 15.0
 CLEAR: Annotated[float, Given("m", OURS)] = LINE - BALL_RADIUS - LINK_HALF_WIDTH
 """A tool whose lowest point is above this y is clear: every ball that rests on it is out."""
 CEILING: Annotated[float, Given("m", OURS)] = CLEAR + 0.5
-"""The hand lifts the tool's lowest point no higher than this y."""
+"""Largest y of the tool's lowest point."""
 
 GOAL_NUMBERS: Annotated[tuple[int, int], Given("balls", TEXT)] = (1, 7)
-"""Smallest and largest wanted number of balls."""
+"""Smallest and largest requested number of balls."""
 REST_SPEED: Annotated[float, Given("m/s", OURS)] = 0.3
-"""A ball on the tool is at rest when it moves slower than this relative to the tool."""
+"""A ball on the tool is at rest if it is slower than this relative to the tool."""
 HELD_STEPS: Annotated[int, Given("control steps", OURS)] = 3
-"""How long in a row the wanted number must be held at rest."""
+"""Consecutive control steps for which the requested number must be held at rest."""
 NUMBER_EXPONENT: Annotated[float, Given("1", OURS)] = 1.5
-"""How sharply progress prefers the wanted number."""
+"""Exponent of progress: how strongly it prefers the requested number."""
 SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
 """Added in every control step."""
 SUCCESS_REWARD: Annotated[float, Given("1", "ours; the paper lists one for its 3D tasks only")] = 1.0
-"""Added once, when the wanted number is held."""
+"""Added once, when the requested number is held."""
 
 NUM_PILES: Annotated[int, Given("piles", OURS)] = 32
-"""Different piles."""
+"""Number of different piles."""
 PILE_SEED: Annotated[int, Given("1", OURS)] = 40
-"""Seed of the places from which balls fall into the piles."""
+"""Seed of the positions from which balls fall into the piles."""
 PILE_STEPS: Annotated[int, Given("physics steps", OURS)] = 240
-"""In which a pile comes to rest."""
+"""Physics steps in which a pile comes to rest."""
 HEAP_COLUMNS = np.linspace(RESERVOIR[0] + BALL_RADIUS, RESERVOIR[1] - BALL_RADIUS, 11)
-"""x of the columns in which balls lie that make room for the tool, m (ours): balls in neighbouring ones are apart."""
+"""x of the columns for balls that make room for the tool, m (ours): balls in adjacent columns do not touch."""
 GAP: Annotated[float, Given("m", OURS)] = 0.02
-"""Balls that make room lie at least this far above others, and no ball starts closer to the tool."""
+"""Smallest gap between balls that make room and those below, and between any ball and the tool at the start."""
 
 HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 30
 """Time limit."""
@@ -156,10 +156,10 @@ CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
 ITERATIONS: Annotated[int, Given("1", OURS)] = 8
 """Of the contact solver in every physics step."""
 MAX_BALL_SPEED: Annotated[float, Given("m/s", OURS)] = 12.0
-"""No ball is ever faster, and none is hit deeper than it moves in a physics step; a million random control steps saw
-10.3 m/s and 0.35 m."""
+"""Bound on the speed of balls; bounds overlaps, too, by the distance in a physics step. A million random control steps
+saw 10.3 m/s and 0.35 m."""
 SLOP: Annotated[float, Given("m", OURS)] = 0.02
-"""Overlap of two bodies that the contact solver leaves alone."""
+"""Overlap of two bodies that the contact solver does not correct."""
 
 
 CONTROL = Box.of(
@@ -196,7 +196,7 @@ HELD, HELD_LESS_WANTED, HELD_FOR = (STATE.index(name) for name in ("held", "held
 SHAPE, WANTS = STATE.group("joint_1_to_"), STATE.group("wants_")
 
 BALL_BODIES, TOOL_BODY = slice(0, NUM_BALLS), NUM_BALLS
-"""Rows of `PlanarSimulator.bodies`; the place of a tool is that of its first joint."""
+"""Rows of `PlanarSimulator.bodies`; the position of a tool is that of its first joint."""
 
 
 class Scoop(Task):
@@ -204,8 +204,8 @@ class Scoop(Task):
 
     Seen from the side, a robot holds a ladle, a chain of three links: a handle and two more that curl up behind it. The
     ladle starts inside the pile. The hand moves it gently and tilts it a little, with limited force. It can hardly
-    shake or pour balls off, and the observation shows how many there are only once they are out. So the number of balls
-    that stay on the tool is decided by its shape: a deep or long ladle for many, a short one for few.
+    shake or pour balls off, and the observation shows their number only when they are out of the reservoir. So the
+    shape of the tool determines how many balls stay on it: a deep or long ladle for many, a short one for few.
 
     Action space
         Design, 5: lengths of the three links (m) and the two angles between them (rad) (paper). Control, 3: velocity of
@@ -213,31 +213,31 @@ class Scoop(Task):
         the tool keeps away from floor and walls (ours).
 
     Observation
-        State, 21: place of the first joint (m), tilt (rad), height of the tool's lowest point (m), velocity (m/s) and
-        angular velocity (rad/s); balls held out of the reservoir, the same less the wanted number, control steps for
-        which success has held; the ways from the first joint to the second and to the tip (m); and which number is
-        wanted, one entry for each. Goal, 1: the wanted number. Then the design and the phase.
+        State, 21: position of the first joint (m), tilt (rad), height of the tool's lowest point (m), velocity (m/s)
+        and angular velocity (rad/s); number of balls held out of the reservoir, the same minus the requested number,
+        control steps for which success has held; the displacements from the first joint to the second and to the tip
+        (m); and a one-hot code of the requested number. Goal, 1: the requested number. Then the design and the phase.
 
     Design space
         Length = initial length (1 + ratio), angle = scale * ratio (our reading of the paper's table). The table has
         three angles; a chain of three links has two joints, and the third angle is not used.
 
     Goal space
-        Whole numbers of balls (paper), each equally often (ours). An instance also holds which pile there is and how
-        far to the left or right the tool starts; policies do not see these two.
+        Integer numbers of balls (paper), with equal probability (ours). An instance also has the index of the pile and
+        the shift of the tool's start to the left or right; policies do not observe these two.
 
     Reward
-        The change of a potential that grows as the tool is lifted and is the larger, the nearer the number of balls
-        above it is to the wanted one; less the paper's slack, and a bonus on success. Lowering the tool loses what
-        lifting it earns. An episode's return is below 2.
+        The change of a potential, plus the paper's slack (negative) and a bonus on success. The potential increases as
+        the tool is lifted, and is larger the nearer the number of balls above it is to the requested one. Lowering the
+        tool loses what lifting it earned. An episode's return is below 2.
 
     Starting state
-        A pile nearly at rest and the tool upright in it, at the place of the paper's table (our reading of it). Balls
-        that would overlap the tool are put on top of the pile and fall into place within the first second (ours).
+        A pile nearly at rest and the tool upright in it, at the paper's position (our reading). Balls that would
+        overlap the tool are put on top of the pile and settle within the first second (ours).
 
     Episode end
-        Success when the tool is clear of the reservoir and as many balls as wanted have been at rest on it for a few
-        control steps, or the time limit.
+        Success when the tool is clear of the reservoir and the requested number of balls has been at rest on it for a
+        few control steps, or the time limit.
     """
 
     name = "scoop"
@@ -273,7 +273,7 @@ class Scoop(Task):
     soundness = Soundness(overlap=MAX_BALL_SPEED * CLOCK.period, speed=MAX_BALL_SPEED, outcome_change=0.3, chaotic=True)
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
-        """Return (count, I) instances: number and pile all alike often, shift uniform."""
+        """Return (count, I) instances with number, pile and shift drawn uniformly."""
         instances = np.zeros((count, INSTANCE.size))
         instances[:, WANTED] = rng.integers(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1, size=count)
         instances[:, PILE] = rng.integers(NUM_PILES, size=count)
@@ -281,11 +281,11 @@ class Scoop(Task):
         return instances
 
     def material(self, designs: Floats) -> Floats:
-        """Return the used share of the largest total link length for designs (b, D) in their units."""
+        """Return the total link length as a fraction of the largest, for designs (b, D) in their units."""
         return chain_material(designs, self.design_space)
 
     def effort(self, controls: Floats) -> Floats:
-        """Return the share of the largest velocity, all three entries normalised, for controls (b, C) in [-1, 1]."""
+        """Return the norm of the normalised velocities as a fraction of the largest, for controls (b, C) in [-1, 1]."""
         speed: Floats = np.linalg.norm(controls, axis=1) / np.sqrt(controls.shape[1])
         return speed
 
@@ -295,8 +295,8 @@ class Scoop(Task):
         return chain_parts(points - points[1], LINK_HALF_WIDTH)
 
     def script(self) -> Behaviour:
-        """Return a script that lifts whatever tool it is given straight up, and designs a ladle for every number."""
-        from ._scripts.scoop import ScoopScript  # here, since that file reads this one
+        """Return a script that designs a ladle for every number and lifts any tool straight up."""
+        from ._scripts.scoop import ScoopScript  # imported here because that file imports this one
 
         return ScoopScript(self)
 
@@ -306,7 +306,7 @@ class Scoop(Task):
 
 
 class _ScoopSimulator(PlanarSimulator):
-    """A pile of balls in a reservoir and a tool that a hand of limited force moves, one of each per slot."""
+    """A pile of balls in a reservoir and a tool moved by a hand with limited force, one of each per slot."""
 
     view = View(x=(YARD[0] - 1.0, YARD[1] + 1.0), y=(FLOOR - 0.6, 24.0))
 
@@ -314,13 +314,13 @@ class _ScoopSimulator(PlanarSimulator):
         super().__init__(num_slots, state_size, num_bodies=NUM_BALLS + 1, clock=clock)
         self.wanted = np.ones(num_slots)
         self.chain = np.zeros((num_slots, 4, 2))
-        """(B, 4, 2) points of the upright tool from its first joint, m."""
+        """(B, 4, 2) points of the upright tool relative to its first joint, m."""
         self.tilt, self.spin = np.zeros(num_slots), np.zeros(num_slots)
         """(B,) angle, rad, and angular velocity, rad/s, of the tools."""
         self.lowest = np.zeros(num_slots)
         """(B,) y of the tool's lowest point, m."""
         self.hand_velocity = np.zeros((num_slots, 2))
-        """(B, 2) of the hands in the last control step, m/s."""
+        """(B, 2) velocities of the hands in the last control step, m/s."""
         self.progress = np.zeros(num_slots)
         self.balls: list[Balls | None] = [None] * num_slots
         self.tools: list[pymunk.Body | None] = [None] * num_slots
@@ -342,7 +342,7 @@ class _ScoopSimulator(PlanarSimulator):
         self._write_state(slots, self.chain[slots])
 
     def build(self, slots: Slots, designs: Floats) -> None:
-        """Dig the tools of `designs` (b, D) into the piles."""
+        """Put the tools of `designs` (b, D) into the piles."""
         points = chain_points(designs, FIRST_LINK_ANGLE)
         chain = points - points[:, 1:2]
         self.chain[slots] = chain
@@ -367,7 +367,8 @@ class _ScoopSimulator(PlanarSimulator):
         for link in links:
             link.friction = TOOL_FRICTION
             link.colour = COLOURS["tool"]
-        # The hand's velocity alone counts, not its place: neither joint corrects a lag (bias).
+        # Joints with limited force transmit the hand's velocity to the tool. Without bias they do not correct a lag in
+        # position: a tool that was held back would otherwise shoot forward once it is free.
         hand = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         grip, wrist = pymunk.PivotJoint(hand, tool, (0.0, 0.0), (0.0, 0.0)), pymunk.GearJoint(hand, tool, 0.0, 1.0)
         grip.max_bias = wrist.max_bias = 0.0
@@ -377,7 +378,7 @@ class _ScoopSimulator(PlanarSimulator):
         return space
 
     def step(self, slots: Slots, controls: Floats) -> None:
-        """Move the hands by `controls` (b, C) for one control step and reward what is lifted."""
+        """Move the hands by `controls` (b, C) for one control step and reward lifted balls."""
         velocity, turn = self._allowed(slots, controls)
         for slot, pair, spin in zip(slots.tolist(), velocity.tolist(), turn.tolist(), strict=True):
             hand = self.hands[slot]
@@ -399,7 +400,7 @@ class _ScoopSimulator(PlanarSimulator):
         )
 
     def inspect(self, slot: int) -> Physics:
-        """Return the balls' deepest overlap, the speed of the fastest, and whether all are inside the outer walls."""
+        """Return the balls' deepest overlap, their highest speed, and whether all are inside the outer walls."""
         space = self.spaces[slot]
         balls = [shape for shape in space.shapes if isinstance(shape, pymunk.Circle)]
         places = self.bodies[slot, BALL_BODIES, PLACE]
@@ -411,11 +412,11 @@ class _ScoopSimulator(PlanarSimulator):
         )
 
     def mark(self, slot: int, canvas: Canvas) -> None:
-        """Draw the height from which on a ball is out of the reservoir."""
+        """Draw the height above which a ball is out of the reservoir."""
         canvas.segment((YARD[0], LINE), (YARD[1], LINE), 0.0, COLOURS["goal"])
 
     def _allowed(self, slots: Slots, controls: Floats) -> tuple[Floats, Floats]:
-        """Return velocity (b, 2) and angular velocity (b,) for `controls` (b, C) that keep tools where they may be."""
+        """Return velocity (b, 2) and angular velocity (b,) for `controls` (b, C), within the limits of the tools."""
         period = self.clock.control_period
         tilt = self.tilt[slots]
         next_tilt = np.clip(tilt + controls[:, TURN] * (MAX_TURN * period), -MAX_TILT, MAX_TILT)
@@ -423,7 +424,7 @@ class _ScoopSimulator(PlanarSimulator):
         low, high = points.min(axis=1), points.max(axis=1)
         least = np.array([RESERVOIR[0] + CLEARANCE, TOOL_START[1]]) - low
         most = np.stack([RESERVOIR[1] - CLEARANCE - high[:, 0], CEILING - low[:, 1]], axis=1)
-        middle = 0.5 * (least + most)  # A tool that tilting made too wide for both clearances stays in the middle.
+        middle = 0.5 * (least + most)  # for tools that became too wide for both clearances by tilting
         joint, change = self.bodies[slots, TOOL_BODY, PLACE], MAX_ACCELERATION * period
         before = self.hand_velocity[slots]
         wish = joint + np.clip(controls[:, MOVE] * MAX_SPEED, before - change, before + change) * period
@@ -434,7 +435,7 @@ class _ScoopSimulator(PlanarSimulator):
         return velocity, turn
 
     def _look(self, slots: Slots) -> None:
-        """Count balls, judge success and measure progress; write the state."""
+        """Count balls, determine success and progress, and write the state."""
         balls, tool = self.bodies[slots, BALL_BODIES], self.bodies[slots, TOOL_BODY]
         wanted, chain = self.wanted[slots], rotated(self.chain[slots], self.tilt[slots])
         self.lowest[slots] = lowest = tool[:, 1] + chain[..., 1].min(axis=1)
@@ -447,6 +448,8 @@ class _ScoopSimulator(PlanarSimulator):
         at_rest = ~(loaded & moving).any(axis=1)
         self.set_success(slots, HELD_STEPS, clear=clear, wanted_number=number == wanted, at_rest=at_rest)
         lift = np.clip((lowest - TOOL_START[1]) / (CEILING - TOOL_START[1]), 0.0, 1.0)
+        # The ratio is lower for one ball too few than for one too many, and for an error of one in 2 than in 7. One is
+        # added to both numbers, so that the first ball does not start from 0.
         ratio = (1.0 + np.minimum(number, wanted)) / (1.0 + np.maximum(number, wanted))
         self.progress[slots] = lift * ratio**NUMBER_EXPONENT
         self._write_state(slots, chain)
@@ -465,7 +468,7 @@ class _ScoopSimulator(PlanarSimulator):
 
 
 def empty_reservoir() -> pymunk.Space:
-    """Return a space with floor and walls, whose inner faces lie at `FLOOR`, `RESERVOIR` and `YARD`, and gravity."""
+    """Return a space with gravity, floor and walls; inner faces are at `FLOOR`, `RESERVOIR` and `YARD`."""
     space = pymunk.Space()
     space.gravity = (0.0, -GRAVITY)
     space.damping = DAMPING
@@ -484,14 +487,14 @@ def empty_reservoir() -> pymunk.Space:
 
 @dataclass(frozen=True)
 class Balls:
-    """Balls that go from one episode's space to the next one's, which takes half the time that new ones take."""
+    """Balls that are moved from one episode's space to the next, in half the time of creating new ones."""
 
     bodies: list[pymunk.Body]
     discs: list[pymunk.Circle]
 
     @classmethod
     def new(cls, radius: float = BALL_RADIUS) -> Balls:
-        """Make balls of `radius`, m, that are in no space."""
+        """Create balls of `radius`, m, that are not in a space."""
         bodies = [pymunk.Body(BALL_MASS, float("inf")) for _ in range(NUM_BALLS)]
         discs = [pymunk.Circle(body, radius) for body in bodies]
         for disc in discs:
@@ -499,10 +502,10 @@ class Balls:
         return cls(bodies, discs)
 
     def move(self, before: pymunk.Space | None, after: pymunk.Space, places: Floats) -> None:
-        """Take the balls out of one space and put them into another, at rest at `places` (N, 2).
+        """Move the balls from one space to another, at rest at `places` (N, 2).
 
-        A step without shapes comes in between: it uses up the corrections of overlaps that pymunk keeps for the next
-        step, so that nothing of the last episode is left.
+        A step without shapes in between uses up the overlap corrections that pymunk keeps for the next step, so that no
+        state of the last episode remains.
         """
         if before is not None:
             before.remove(*self.bodies, *self.discs)
@@ -516,10 +519,10 @@ class Balls:
 
 @cache
 def settled_piles() -> Floats:
-    """Return the balls' places in all piles, (P, N, 2), in m: dropped row by row and left to come to rest.
+    """Return the balls' positions in all piles, (P, N, 2), m, after they were dropped row by row and came to rest.
 
-    They come to rest as slightly larger balls, so that the balls of an episode do not overlap at its start; then, too,
-    they slump a little.
+    They settle as slightly larger balls, so that the balls of an episode do not overlap at its start; the pile then
+    settles a little further.
     """
     rng = np.random.default_rng(PILE_SEED)
     row, column = np.divmod(np.arange(NUM_BALLS), 8)
@@ -534,18 +537,20 @@ def settled_piles() -> Floats:
         for _ in range(PILE_STEPS):
             space.step(CLOCK.period)
         result[pile] = [body.position for body in balls.bodies]
-    result.flags.writeable = False  # It is shared by all simulators.
+    result.flags.writeable = False  # shared by all simulators
     return result
 
 
 def make_room(balls: Floats, tool: Floats) -> Floats:
-    """Return `balls` (N, 2) with those that overlap the tool with points `tool` (4, 2) put on top of the pile.
+    """Return `balls` (N, 2) after moving those that overlap the tool with points `tool` (4, 2) to the top of the pile.
 
-    They lie in columns, the lowest places first, at rest and clear of the tool and of one another.
+    They are put in columns, lowest positions first, at rest and clear of the tool and of each other.
     """
     clear = BALL_RADIUS + LINK_HALF_WIDTH + GAP
     moved = distances(balls, tool) < clear
     rest = balls[~moved]
+    # A ball in a column touches a ball of the pile where their centres are two radii apart: the height follows from
+    # Pythagoras. Balls further than two radii from the column do not matter, and an empty column starts at the floor.
     square = (2.0 * BALL_RADIUS) ** 2 - (HEAP_COLUMNS[:, None] - rest[:, 0]) ** 2
     touching = np.where(square > 0.0, rest[:, 1] + np.sqrt(np.maximum(square, 0.0)), FLOOR + BALL_RADIUS)
     layers = (2.0 * BALL_RADIUS + GAP) * np.arange(4)[:, None] + GAP
@@ -559,9 +564,10 @@ def make_room(balls: Floats, tool: Floats) -> Floats:
 
 
 def distances(places: Floats, tool: Floats) -> Floats:
-    """Return the distance (N,) of `places` (N, 2) from the middle line of a chain with points `tool` (4, 2)."""
+    """Return the distances (N,) of `places` (N, 2) from the middle line of a chain with points `tool` (4, 2)."""
     start, link = tool[:-1], tool[1:] - tool[:-1]
     offset = places[:, None] - start
+    # Projection on each link's line, clipped to the link itself: the nearest point of a segment.
     share = np.clip((offset * link).sum(axis=2) / (link * link).sum(axis=1), 0.0, 1.0)
     nearest: Floats = ((offset - share[..., None] * link) ** 2).sum(axis=2).min(axis=1)
     return np.sqrt(nearest)
@@ -579,7 +585,7 @@ def above(places: Floats, chains: Floats) -> Booleans:
 
 
 def rotated(points: Floats, angles: Floats) -> Floats:
-    """Return `points` (b, 4, 2) turned about the origin by `angles` (b,), rad."""
+    """Return `points` (b, 4, 2) rotated about the origin by `angles` (b,), rad."""
     cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
     x, y = points[..., 0], points[..., 1]
     return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)

@@ -51,102 +51,102 @@ PAPER = "paper, table of 3D scoop"
 TEXT = 'paper, appendix "Environment Details"'
 
 BALLS: Annotated[int, Given("balls", TEXT)] = 40
-"""In the reservoir."""
+"""Number of balls in the reservoir."""
 WANTED: Annotated[tuple[int, int], Given("balls", TEXT)] = (1, 7)
-"""Fewest and most balls that are wanted."""
+"""Smallest and largest requested number of balls."""
 
 BOX_MIN: Annotated[Triple, Given("m", PAPER, "box_dimensions_min")] = (0.04, 0.005, 0.02)
 """Smallest width, thickness and height of a plate, read as half extents, as PyBullet does (our reading)."""
 BOX_MAX: Annotated[Triple, Given("m", PAPER, "box_dimensions_max")] = (0.08, 0.005, 0.05)
 """Largest width, thickness and height of a plate, read as half extents (our reading)."""
 HALF_THICKNESS = BOX_MIN[1]
-"""Of a plate, m: the paper's smallest and largest are the same."""
+"""Half thickness of a plate, m: the paper's smallest and largest are the same."""
 ANGLE_MIN: Annotated[float, Given("degrees", PAPER, "tool_angle_min")] = -15.0
-"""How far a side plate leans outwards at least."""
+"""Smallest outward lean of a side plate."""
 ANGLE_MAX: Annotated[float, Given("degrees", PAPER, "tool_angle_max")] = 15.0
-"""How far a side plate leans outwards at most."""
+"""Largest outward lean of a side plate."""
 HANDLE_HALF_EXTENTS: Annotated[Triple, Given("m", OURS)] = (0.01, HALF_THICKNESS, 0.1)
-"""Of the handle."""
+"""Half extents of the handle."""
 HANDLE_LEAN: Annotated[float, Given("rad", OURS)] = np.deg2rad(30.0)
-"""The handle leans outwards by this from the back plate: it never passes over the opening."""
+"""Outward lean of the handle from the back plate, so that it is never above the opening."""
 TOOL_MASS: Annotated[float, Given("kg", OURS)] = 0.2
-"""Of the tool."""
+"""Mass of the tool."""
 PUSH_FORCE: Annotated[float, Given("N", OURS)] = 20.0
 """Largest force of a sliding joint of the gantry."""
 TURN_TORQUE: Annotated[float, Given("N m", OURS)] = 2.0
 """Largest torque of a turning joint of the gantry."""
 
 BALL_RADIUS: Annotated[float, Given("m", OURS)] = 0.029
-"""Of a ball: tools hold 1 ball to 15."""
+"""Radius of a ball: tools hold 1 to 15 balls."""
 BALL_MASS: Annotated[float, Given("kg", OURS)] = 0.05
-"""Of a ball."""
+"""Mass of a ball."""
 FRICTION: Annotated[float, Given("1", OURS)] = 0.3
-"""Of balls, plates, walls and floor; PyBullet multiplies the frictions of a contact's two bodies, so a contact's is
-0.09: slippery balls do not pile up beyond the rim."""
+"""Friction of balls, plates, walls and floor. PyBullet multiplies the coefficients of the two bodies, so a contact has
+0.09: slippery balls do not pile up above the rim."""
 TOOL_FRICTION: Annotated[float, Given("1", OURS)] = FRICTION
-"""Of the tool's surface."""
+"""Friction of the tool's surface."""
 LINEAR_DAMPING: Annotated[float, Given("1/s", OURS)] = 0.1
-"""Share of its speed that a ball loses in a second."""
+"""Fraction of its speed that a ball loses per second."""
 ANGULAR_DAMPING: Annotated[float, Given("1/s", OURS)] = 0.5
-"""Share of its spin that a ball loses in a second."""
+"""Fraction of its spin that a ball loses per second."""
 RESERVOIR: Annotated[tuple[float, float], Given("m", OURS)] = (0.22, 0.255)
-"""Half the inner size of the reservoir along x and y: a ball passes between any tool and a wall."""
+"""Half the inner size of the reservoir along x and y: a ball fits between any tool and a wall."""
 WALL_HEIGHT: Annotated[float, Given("m", OURS)] = 0.1
-"""Of the reservoir's walls."""
+"""Height of the reservoir's walls."""
 WALL_HALF_THICKNESS: Annotated[float, Given("m", OURS)] = 0.01
-"""Of the reservoir's walls."""
+"""Half thickness of the reservoir's walls."""
 FLOOR_PICTURE = (1.0, 1.0, 0.01)
-"""Half extents of what is drawn of the endless floor, m (ours)."""
+"""Half extents of the drawn part of the infinite floor, m (ours)."""
 FLOOR_COLOUR = "#e4e6ea"
-"""What the floor is drawn in (ours)."""
+"""Colour of the floor (ours)."""
 LINE: Annotated[float, Given("m", OURS)] = 0.13
-"""A tool that is nowhere lower than this is clear of the reservoir."""
+"""A tool whose lowest point is above this is clear of the reservoir."""
 
 FLOOR_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.004
-"""Between floor and bottom plate at the start, and least ever."""
+"""Gap between floor and bottom plate at the start, and smallest allowed gap."""
 TOOL_START: Annotated[Triple, Given("m", f"{PAPER}; z ours", "tool_position_init")] = (
     0.0,
     0.05,
     FLOOR_CLEARANCE + HALF_THICKNESS,
 )
-"""Where the middle of the bottom plate starts: the paper's z is above the balls, ours is among them."""
+"""Start of the centre of the bottom plate: the paper's z is above the balls, ours is among them."""
 REACH: Annotated[tuple[float, float], Given("m", OURS)] = (0.03, 0.03)
-"""The tool moves no further than this from its start along x and y."""
+"""Largest distance of the tool from its start along x and y."""
 HIGHEST: Annotated[float, Given("m", OURS)] = 0.2
-"""Highest place of the middle of the bottom plate."""
+"""Largest height of the centre of the bottom plate."""
 LARGEST_TURN: Annotated[Triple, Given("rad", OURS)] = (0.25, 0.25, 0.3)
-"""Largest turns about x, y and z: the tool cannot be tipped out, so that its shape decides the count."""
+"""Largest rotations about x, y and z: the tool cannot be emptied, so its shape determines the number of balls."""
 CONTROL_MIN: Annotated[tuple[float, ...], Given("1", PAPER, "control_action_min")] = (-1.0,) * 3 + (-1.57,) * 3
 """Lower bounds of a control along and about x, y and z, before scaling."""
 CONTROL_MAX: Annotated[tuple[float, ...], Given("1", PAPER, "control_action_max")] = (1.0,) * 3 + (1.57,) * 3
 """Upper bounds of a control, before scaling."""
 CONTROL_SCALE: Annotated[float, Given("m, rad", OURS, "control_action_scale")] = 0.015
-"""From these bounds to a change of pose in a control step: 0.45 m/s and 0.71 rad/s. The paper's scale would be 1.5 m/s
-and 2.4 rad/s, at which balls are thrown about."""
+"""Scales a control to a change of pose per control step: 0.45 m/s and 0.71 rad/s. The paper's scale would be 1.5 m/s
+and 2.4 rad/s, which throws balls around."""
 
 PILES: Annotated[int, Given("piles", OURS)] = 2**20
-"""Different piles."""
+"""Number of different piles."""
 POUR_COLUMNS: Annotated[int, Given("balls", OURS)] = 3
-"""Balls that lie where the tool will are poured on it in layers of this many by this many."""
+"""Balls at the tool's start are poured onto it in layers of this number squared."""
 POUR_GAP: Annotated[float, Given("m", OURS)] = 0.004
-"""Between balls before they are poured."""
+"""Gap between balls before they are poured."""
 SETTLING_STEPS: Annotated[int, Given("control steps", OURS)] = 16
-"""For which poured balls come to rest before the first control."""
+"""Control steps in which poured balls come to rest before the first control."""
 
 HELD_SPEED: Annotated[float, Given("m/s", OURS)] = 0.5
-"""A held ball moves no faster than this in the frame of the tool."""
+"""Largest speed of a held ball in the frame of the tool."""
 HELD_STEPS: Annotated[int, Given("control steps", OURS)] = 6
-"""How long in a row the wanted number must be held."""
+"""Consecutive control steps for which the requested number must be held."""
 LOST_STEPS: Annotated[int, Given("control steps", OURS)] = 30
-"""For which a tool may be clear of the reservoir without success."""
+"""Control steps for which a tool may be clear of the reservoir without success."""
 PROGRESS_REWARD: Annotated[float, Given("1", OURS)] = 5.0
 """Scale of the potential."""
 CLOSENESS_POWER: Annotated[float, Given("1", OURS)] = 1.5
-"""How much a wrong count costs."""
+"""Exponent of the potential: how much a wrong number costs."""
 SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
 """Added in every control step."""
 SUCCESS_REWARD: Annotated[float, Given("1", PAPER, "success_reward")] = 10.0
-"""Added once, when the wanted number is held."""
+"""Added once, when the requested number is held."""
 
 HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 100
 """Time limit."""
@@ -158,14 +158,14 @@ CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
 SOLVER_ITERATIONS: Annotated[int, Given("1", OURS)] = 10
 """Of the contact solver in every physics step."""
 CONTACT_CORRECTION: Annotated[float, Given("1", OURS)] = 0.5
-"""Share of an overlap that a physics step takes away."""
+"""Fraction of an overlap that a physics step removes."""
 
 SIDES = ("back", "front", "left", "right")
 BACK = SIDES.index("back")
 SIDE_NODES = (1, 3, 4, 5)
-"""Their nodes in the tool graph."""
+"""Nodes of the side plates in the tool graph."""
 OUTWARDS = np.array([[0.0, -1.0], [0.0, 1.0], [-1.0, 0.0], [1.0, 0.0]])
-"""(P, 2) where the side plates stand, seen from the middle of the bottom plate."""
+"""(P, 2) directions of the side plates from the centre of the bottom plate."""
 
 
 (_WIDTH, _, _HEIGHT) = ((2.0 * low, 2.0 * high, "m") for low, high in zip(BOX_MIN, BOX_MAX, strict=True))
@@ -178,7 +178,7 @@ DESIGN = Box.of(
 )
 BOTTOM_WIDTH, BOTTOM_LENGTH = DESIGN.index("bottom_width"), DESIGN.index("bottom_length")
 BOTTOM = DESIGN.slice("bottom_width", "bottom_length")
-"""Along x and y."""
+"""Size of the bottom plate along x and y."""
 HEIGHTS, ANGLES = (DESIGN.slice(*(f"{side}_{what}" for side in SIDES)) for what in ("height", "angle"))
 
 CONTROL = Box(
@@ -219,7 +219,7 @@ POSE_PLACE, POSE_TURN = slice(0, 3), slice(3, 6)
 
 
 def _ball_picture(rings: int = 6, columns: int = 9) -> tuple[list[list[float]], list[int]]:
-    """Return points and triangles of a coarse ball; PyBullet's own, a fine one, takes 0.3 ms a ball to make."""
+    """Return vertices and triangles of a coarse ball; PyBullet's fine ball takes 0.3 ms each to create."""
     tilt, turn = np.meshgrid(np.linspace(0.0, np.pi, rings), np.linspace(0.0, 2.0 * np.pi, columns), indexing="ij")
     points = np.stack([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)], axis=-1)
     corner = (np.arange(rings - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
@@ -229,54 +229,54 @@ def _ball_picture(rings: int = 6, columns: int = 9) -> tuple[list[list[float]], 
 
 
 BALL_PICTURE = _ball_picture()
-"""Points (m) and triangles of what is drawn for a ball."""
+"""Vertices (m) and triangles of a ball in pictures."""
 
 
 class Scoop3D(Task):
-    """Scoop as many balls out of a reservoir as are wanted (paper, appendix "Environment Details").
+    """Scoop a requested number of balls out of a reservoir (paper, appendix "Environment Details").
 
     The tool is a scoop of six links: a rectangular bottom plate, a plate on each of its four sides, and a handle on the
-    back one. It starts on the floor of the reservoir, among the balls and filled to overflowing; what does not fit
-    rolls off on the way up. The tool can be turned only a little, so the room between its plates decides how many balls
-    come along, and every number wants a tool of its own.
+    back plate. It starts on the floor of the reservoir, among the balls and overfilled; balls that do not fit roll off
+    on the way up. The tool can be rotated only a little, so the room between its plates determines how many balls stay
+    on it, and every number needs a different tool.
 
     Action space
         Design, 10: width and length of the bottom plate (m), heights of the back, front, left and right plates (m), and
-        how far each of these leans outwards (rad) (paper). Control, 6: change of the tool's place x, y, z (m) and of
-        its turns about x, y, z (rad) in a control step (paper; scale ours). Place and turns are limited (ours).
+        how far each of these leans outwards (rad) (paper). Control, 6: change of the tool's position x, y, z (m) and of
+        its rotations about x, y, z (rad) in a control step (paper; scale ours). Both are limited (ours).
 
     Observation
-        State, 22: place x, y, z (m) and turns about x, y, z (rad) of the bottom plate, way from its lowest point up to
-        the line (m); balls in or above the tool, balls held above the line, balls that are missing; the shares of the
-        control steps after which success and failure come; mean place of the balls in or above the tool, in its frame,
-        x, y (m), and the highest of them (m); and which number is wanted, one entry for each. Goal, 1: the wanted
-        number. Then the design and the phase.
+        State, 22: position x, y, z (m) and rotations about x, y, z (rad) of the bottom plate, distance from its lowest
+        point up to the line (m); numbers of balls in or above the tool, held above the line, and missing; elapsed
+        fractions of the control steps to success and failure; mean position of the balls in or above the tool, in its
+        frame, x, y (m), and the height of the highest of them (m); and a one-hot code of the requested number. Goal, 1:
+        the requested number. Then the design and the phase.
 
     Design space
-        Sizes are whole widths, lengths and heights: the paper's table is read as half extents, PyBullet's own measure
-        (ours); its fixed entry is half the thickness of all plates. The bottom plate joins the four side plates, the
-        back plate joins the handle, which the robot holds: it is fixed and leans back (ours), so that it never passes
-        over the opening.
+        Sizes are full widths, lengths and heights: we read the paper's table as half extents, PyBullet's convention;
+        its fixed entry is half the thickness of all plates. The bottom plate is joined to the four side plates, and the
+        back plate to the handle, which the robot holds. The handle is fixed and leans back (ours), so that it is never
+        above the opening.
 
     Goal space
-        Whole numbers of balls (paper), each equally often. An instance also holds the number of a pile: how the balls
-        are placed and poured on the tool. Policies do not see it.
+        Integer numbers of balls (paper), with equal probability. An instance also has the index of a pile, which fixes
+        how the balls are placed and poured onto the tool. Policies do not observe it.
 
     Reward
-        The change of a potential that grows as the tool is lifted and is the larger, the nearer the number of balls in
-        or above it is to the wanted one; less the paper's slack, and the paper's bonus on success. The potential starts
-        at 0 whatever is in the tool. An episode's return is below 15.
+        The change of a potential, plus the paper's slack (negative) and the paper's bonus on success. The potential
+        increases as the tool is lifted, and is larger the nearer the number of balls in or above it is to the requested
+        one. It starts at 0 for any number of balls in the tool. An episode's return is below 15.
 
     Starting state
-        The middle of the bottom plate is where the paper's table has it, but close to the floor: at the paper's height
-        it would be above the balls. The balls are on the floor side by side, each anywhere in its own cell. Those that
-        would touch the tool are poured on it from above, then all come to rest before the first control (ours).
+        The centre of the bottom plate is at the paper's position, but close to the floor: at the paper's height it
+        would be above the balls. The balls are on the floor, each at a random position in its cell. Those that would
+        touch the tool are poured onto it from above, and all come to rest before the first control (ours).
 
     Episode end
-        Success when the tool is clear of the reservoir and exactly the wanted number of balls has been held for a few
-        control steps; failure when it has been clear for longer without success; or the time limit. A ball is held if
-        it is between the side plates, above the bottom plate, and slow in the tool's frame; while another one is still
-        flying over the tool, nothing counts.
+        Success when the tool is clear of the reservoir and exactly the requested number of balls has been held for a
+        few control steps; failure when it has been clear for longer without success; or the time limit. A ball is held
+        if it is between the side plates, above the bottom plate, and slow in the tool's frame. The condition does not
+        hold while another ball is flying above the tool.
     """
 
     name = "scoop_3d"
@@ -311,27 +311,27 @@ class Scoop3D(Task):
     run_settings: ClassVar[ByProfile] = {"laptop": {"steps": 500_000, "evaluations": 10}}
     outcome = Quantity("balls held above the line", "balls")
     max_slots = MAX_SLOTS
-    # Balls that meet at up to 2.8 m/s overlap for a step of 1/120 s, also right after they were poured; tools start
-    # clear of all. A million random steps saw 0.56 and, right after pouring, 0.32 radii.
+    # Balls that collide at up to 2.8 m/s overlap for a step of 1/120 s, also right after pouring; tools start clear of
+    # all bodies. A million random steps saw overlaps of 0.56 radii and, right after pouring, 0.32 radii.
     soundness = Soundness(
         overlap=0.6 * BALL_RADIUS, speed=4.0, outcome_change=0.5, start_overlap=0.35 * BALL_RADIUS, chaotic=True
     )
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
-        """Return (count, I) random whole numbers of balls and piles."""
+        """Return (count, I) random numbers of balls and indices of piles."""
         instances = np.zeros((count, INSTANCE.size))
         instances[:, BALLS_WANTED] = rng.integers(WANTED[0], WANTED[1], size=count, endpoint=True)
         instances[:, PILE] = rng.integers(0, PILES, size=count)
         return instances
 
     def material(self, designs: Floats) -> Floats:
-        """Return the area of the plates over the largest one for designs (b, D) in their units."""
+        """Return the area of the plates as a fraction of the largest, for designs (b, D) in their units."""
         largest = _area(np.array([self.design_space.high]))
         share: Floats = _area(designs) / largest
         return share
 
     def effort(self, controls: Floats) -> Floats:
-        """Return the share of the largest change of pose for controls (b, C) in [-1, 1]."""
+        """Return the change of pose as a fraction of the largest, for controls (b, C) in [-1, 1]."""
         change: Floats = np.linalg.norm(controls, axis=1) / np.sqrt(controls.shape[1])
         return change
 
@@ -341,7 +341,7 @@ class Scoop3D(Task):
 
     def script(self) -> Behaviour:
         """Return a script that lifts straight up and holds still."""
-        from ._scripts.scoop_3d import Scoop3DScript  # here, since that file reads this one
+        from ._scripts.scoop_3d import Scoop3DScript  # imported here because that file imports this one
 
         return Scoop3DScript(self)
 
@@ -370,7 +370,7 @@ class _ScoopSimulator(BulletSimulator):
         self.piles: list[np.random.Generator] = [np.random.default_rng(0)] * num_slots
         self.designs = np.zeros((num_slots, DESIGN.size))
         self.local = np.zeros((num_slots, BALLS, 3))
-        """(B, N, 3) balls in the frame of the tool."""
+        """(B, N, 3) positions of the balls in the frame of the tool."""
         self.potential = np.zeros(num_slots)
         self.clear_steps = np.zeros(num_slots, dtype=np.intp)
 
@@ -388,7 +388,7 @@ class _ScoopSimulator(BulletSimulator):
         self.state[slots, WANTS] = np.arange(WANTED[0], WANTED[1] + 1) == self.wanted[slots, None]
 
     def build_scene(self, slot: int) -> list[int]:
-        """Build floor and walls, and lay the balls on the floor side by side."""
+        """Build floor and walls, and put the balls next to each other on the floor."""
         world = self.worlds[slot]
         floor = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=world)
         slab = pybullet.createVisualShape(
@@ -421,7 +421,7 @@ class _ScoopSimulator(BulletSimulator):
         picture: int = -1,
         colour: str = COLOURS["scene"],
     ) -> list[int]:
-        """Add rigid bodies of one shape; a world of these steps in half the time that one of multi-bodies takes."""
+        """Add rigid bodies of one shape; a world of rigid bodies steps twice as fast as one of multibodies."""
         world = self.worlds[slot]
         bodies: list[int] = list(
             pybullet.createMultiBody(
@@ -442,7 +442,7 @@ class _ScoopSimulator(BulletSimulator):
         return bodies
 
     def build(self, slots: Slots, designs: Floats) -> None:
-        """Put the tools `designs` (b, D) on the floor and pour the balls that lay there on them."""
+        """Put the tools `designs` (b, D) on the floor and pour the balls that were there onto them."""
         self.designs[slots] = designs
         for slot, design in zip(slots.tolist(), designs, strict=True):
             balls, world = self.bodies[slot, :, PLACE], self.worlds[slot]
@@ -456,11 +456,11 @@ class _ScoopSimulator(BulletSimulator):
         for _ in range(self.settling_steps):
             self.advance(slots)
         self._observe(slots)
-        self._observe(slots)  # Twice: balls that rest in the tool are slow.
+        self._observe(slots)  # twice: speed is the change since the last call, and settled balls are slow
         self.potential[slots] = 0.0
 
     def step(self, slots: Slots, controls: Floats) -> None:
-        """Change the tools' poses by `controls` (b, C) and reward balls lifted."""
+        """Change the tools' poses by `controls` (b, C) and reward lifted balls."""
         self.drive(slots, self._displacements(slots, controls))
         self.advance(slots)
         above, held, clear, raised = self._observe(slots)
@@ -481,7 +481,7 @@ class _ScoopSimulator(BulletSimulator):
         self.state[slots, CLEAR_SHARE] = self.clear_steps[slots] / LOST_STEPS
 
     def inspect(self, slot: int) -> Physics:
-        """Return deepest overlap, fastest ball and whether all balls are in the room; balls by their distances."""
+        """Return deepest overlap, highest speed, and whether all balls are in the room; balls overlap by distance."""
         world, tool, balls = self.worlds[slot], self._tool(slot), self.bodies[slot, :, PLACE]
         apart = np.linalg.norm(balls[:, None] - balls, axis=2) + 2.0 * BALL_RADIUS * np.eye(BALLS)
         others = {pybullet.getBodyUniqueId(index, world) for index in range(pybullet.getNumBodies(world))}
@@ -507,7 +507,7 @@ class _ScoopSimulator(BulletSimulator):
         )
 
     def mark(self, slot: int, marks: Marks) -> None:
-        """Draw the line around the reservoir, and a dot on it for every ball wanted, filled for every ball held."""
+        """Draw the line around the reservoir, with a dot for every requested ball, filled for every held ball."""
         x, y = RESERVOIR
         corners = np.array([(x, y), (-x, y), (-x, -y), (x, -y), (x, y)])
         marks.line(np.pad(corners, ((0, 0), (0, 1)), constant_values=LINE), COLOURS["goal"])
@@ -518,7 +518,7 @@ class _ScoopSimulator(BulletSimulator):
             marks.dot(dot, COLOURS["object" if place < self.outcome[slot] else "background"], radius=4)
 
     def _displacements(self, slots: Slots, controls: Floats) -> Floats:
-        """Return the (b, 6) changes of pose that `controls` (b, C) ask for, within the limits."""
+        """Return the changes of pose (b, 6) for `controls` (b, C), within the limits."""
         pose = self.pose[slots]
         target = pose + controls * CONTROL.bounds[1]
         for axis in (0, 1):
@@ -530,10 +530,12 @@ class _ScoopSimulator(BulletSimulator):
         return displacement
 
     def _observe(self, slots: Slots) -> tuple[Floats, Floats, Booleans, Floats]:
-        """Read the worlds; return balls above and held, whether the tools are clear, and the share of the way up."""
+        """Read the worlds; return balls above and held, whether tools are clear, and the lifted fraction, (b,) each."""
         pose, balls = self.read_tools(slots), self.read_bodies(slots)[:, :, PLACE]
         matrices = turn_matrices(pose[:, POSE_TURN])
         local = (balls - pose[:, None, POSE_PLACE]) @ matrices
+        # Speed from the change of position in the tool's own frame: the motion of the tool, its rotation included,
+        # drops out.
         slow = np.linalg.norm(local - self.local[slots], axis=2) < HELD_SPEED * self.clock.control_period
         self.local[slots] = local
         over = above_bottom(self.designs[slots], local)
@@ -556,7 +558,7 @@ class _ScoopSimulator(BulletSimulator):
 
 
 def lay_balls(rng: np.random.Generator) -> Floats:
-    """Return the (N, 3) places of balls that lie on the floor side by side, each anywhere in a cell of its own."""
+    """Return the positions (N, 3) of balls on the floor, each at a random position in a separate cell."""
     columns = int(RESERVOIR[0] / BALL_RADIUS)
     rows = -(-BALLS // columns)
     cell = np.array([2.0 * RESERVOIR[0] / columns, 2.0 * RESERVOIR[1] / rows])
@@ -568,11 +570,11 @@ def lay_balls(rng: np.random.Generator) -> Floats:
 
 
 def pour(design: Floats, count: int, rng: np.random.Generator) -> Floats:
-    """Return (count, 3) places above the tool `design` (D,) at its start, in layers, clear of it and of each other."""
+    """Return positions (count, 3) above the tool `design` (D,) at its start, in layers, all clear of each other."""
     pitch = 2.0 * BALL_RADIUS + POUR_GAP
     layer, row, column = np.unravel_index(np.arange(count), (BALLS, POUR_COLUMNS, POUR_COLUMNS))
     angles, heights = design[ANGLES], design[HEIGHTS]
-    # The first row clears the back plate, which stands on the plate's rear edge and may lean inwards, over the opening.
+    # The first row is clear of the back plate, which is on the rear edge of the bottom plate and may lean inwards.
     inwards = max(0.0, -np.sin(angles[BACK]) * heights[BACK])
     back = -0.5 * design[BOTTOM_LENGTH] + inwards + BALL_RADIUS + 0.5 * POUR_GAP
     first = max(back, -pitch)
@@ -581,14 +583,14 @@ def pour(design: Floats, count: int, rng: np.random.Generator) -> Floats:
     top = (heights * np.cos(angles)).max() - HALF_THICKNESS
     x = (column - 0.5 * (POUR_COLUMNS - 1)) * pitch + jitter[:, 0] + shift[0]
     y = first + row * pitch + jitter[:, 1] + shift[1]
-    # The lowest layer is above the tool's rim and above the balls that lie outside of it.
+    # The lowest layer is above the tool's rim and above the balls on the floor around it.
     lowest = max(top + BALL_RADIUS + 2.0 * HALF_THICKNESS, BALL_RADIUS + pitch - TOOL_START[2])
     z = lowest + layer * pitch
     return TOOL_START + np.stack([x, y, z], axis=1)
 
 
 def scoop_boxes(designs: Floats) -> Boxes:
-    """Return the boxes of tools (b, D) in their own frame: handle, back, bottom, front, left and right plates."""
+    """Return the boxes of tools (b, D) in the tool's frame: handle, back, bottom, front, left and right plates."""
     count = len(designs)
     half, heights, angles = 0.5 * designs[:, BOTTOM], 0.5 * designs[:, HEIGHTS], designs[:, ANGLES]
     sizes = np.zeros((count, 6, 3))
@@ -598,7 +600,8 @@ def scoop_boxes(designs: Floats) -> Boxes:
     for side, node in enumerate(SIDE_NODES):
         axis = int(np.argmax(np.abs(OUTWARDS[side])))
         height, angle = heights[:, side], angles[:, side]
-        # The plate's inner face meets the bottom's edge, flush with its underside, and turns outwards about there.
+        # The plate's inner face starts at the bottom plate's edge, level with its underside, and rotates outwards about
+        # this line.
         out = half[:, axis] + HALF_THICKNESS * np.cos(angle) + height * np.sin(angle)
         centres[:, node, axis] = OUTWARDS[side, axis] * out
         centres[:, node, 2] = height * np.cos(angle) - HALF_THICKNESS * (1.0 + np.sin(angle))
@@ -607,7 +610,7 @@ def scoop_boxes(designs: Floats) -> Boxes:
         sizes[:, node, 2] = height
         sign = OUTWARDS[side, axis] * (1.0 if axis == 0 else -1.0)
         rotations[:, node] = rotations_about(1 - axis, sign * angle)
-    # The handle goes on from the top of the back plate and leans further back.
+    # The handle starts at the top of the back plate and leans further back.
     angle, height = angles[:, BACK], heights[:, BACK]
     lean = angle + HANDLE_LEAN
     sizes[:, 0] = HANDLE_HALF_EXTENTS
@@ -620,10 +623,11 @@ def scoop_boxes(designs: Floats) -> Boxes:
 
 
 def beyond_sides(designs: Floats, points: Floats) -> Floats:
-    """Return how far `points` (b, n, 3), in the frame of tools (b, D), lie outside each inner face: (b, n, P)."""
+    """Return the signed distances (b, n, P) of `points` (b, n, 3), in the tools' frames, beyond each inner face."""
     half = 0.5 * designs[:, [BOTTOM_LENGTH, BOTTOM_LENGTH, BOTTOM_WIDTH, BOTTOM_WIDTH]][:, None]
     angles = designs[:, None, ANGLES]
     out = points[..., :2] @ OUTWARDS.T - half
+    # Component along the plate's normal: a face that leans outwards by `angle` is further out, the higher the point.
     result: Floats = out * np.cos(angles) - (points[..., 2:] + HALF_THICKNESS) * np.sin(angles)
     return result
 
@@ -642,21 +646,26 @@ def touching(design: Floats, balls: Floats) -> Booleans:
 
 
 def turn_matrices(turns: Floats) -> Floats:
-    """Return the (b, 3, 3) rotations of `turns` (b, 3) about x, then y, then z, each about the turned axis."""
+    """Return the rotation matrices (b, 3, 3) of `turns` (b, 3) about x, then y, then z, each about the rotated axis.
+
+    This is the order of the gantry's turning joints.
+    """
     about_x, about_y, about_z = (rotation_matrices(rotations_about(axis, turns[:, axis])) for axis in range(3))
     result: Floats = about_x @ about_y @ about_z
     return result
 
 
 def drop(designs: Floats, matrices: Floats) -> Floats:
-    """Return how far the lowest point of the bottom plates lies below their middle, (b,), m."""
+    """Return the height (b,) of the bottom plates' centres above their lowest points, m."""
+    # Support of a box along z: for the lowest corner, every half extent counts with the absolute vertical component of
+    # its axis.
     half = np.column_stack([0.5 * designs[:, BOTTOM], np.full(len(designs), HALF_THICKNESS)])
     result: Floats = (np.abs(matrices[:, 2]) * half).sum(axis=1)
     return result
 
 
 def closeness(count: Floats, wanted: Slots) -> Floats:
-    """Return 1 for the wanted count and less the further the ratio of count and wanted is from 1."""
+    """Return 1 for the requested number, and less the further the ratio of both numbers is from 1."""
     few, many = np.minimum(count, wanted) + 1.0, np.maximum(count, wanted) + 1.0
     result: Floats = (few / many) ** CLOSENESS_POWER
     return result

@@ -49,7 +49,7 @@ def test_it_runs_what_is_missing_draws_and_does_nothing_twice(tmp_path: Path) ->
         assert (tmp_path / "figures" / f"{name}.png").exists(), text
     assert (tmp_path / "claims" / "claims.md").exists()
     assert "toy_reach" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "2 of them done before" in run(experiment, tmp_path)[1]
+    assert "2 of them already done" in run(experiment, tmp_path)[1]
 
 
 @pytest.mark.usefixtures("toy")

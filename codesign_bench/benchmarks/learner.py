@@ -204,7 +204,7 @@ def _write(out: Path, work: Workload, top: Mapping[str, float], found: Mapping[s
     try:
         write_json(out, content)
     except OSError as error:
-        raise UserError(f"--out {out}: cannot write there ({error.strerror})") from error
+        raise UserError(f"--out {out}: not writable ({error.strerror})") from error
 
 
 def _in_process(name: str, work: Workload) -> Speed:

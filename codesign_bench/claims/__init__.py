@@ -1,5 +1,5 @@
-"""Which of the paper's findings do results support? One claim, one entry in `paper.py`; see docs/claims.md.
+"""Which findings of a study do results support? A study lists its claims; see docs/claims.md.
 
-`claim.py` says what a claim, its rule and its finding are, `evidence.py` what they are judged on, `rules.py` holds the
-kinds of rules, `paper.py` the paper's claims, `verify.py` judges them and writes the table.
+`claim.py` says what a claim and its rule are, `finding.py` what a rule finds, `evidence.py` what claims are judged on,
+`verify.py` judges them and writes the table. Each other module holds rules of one kind.
 """

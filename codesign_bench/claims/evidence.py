@@ -117,7 +117,7 @@ def load_evidence(results: Path) -> Evidence:
     outside = _read(load_outside, results, ("task", "method", "seed", "instance", "success"))
     deployment = _read(load_deployment, results, ("task", "kind", "tool", "row", "column", "success"))
     if evaluations.empty and sensitivity.empty:
-        raise UserError(f"no finished cell in '{results}' yet; make some with: codesign-bench run --out {results}")
+        raise UserError(f"no finished cell in '{results}' yet; create some with: codesign-bench run --out {results}")
     profile = profiles.pop() if len(profiles) == 1 else DEFAULT_PROFILE
     return Evidence(curves, evaluations, sensitivity, outside, deployment, _design_widths(evaluations), profile)
 

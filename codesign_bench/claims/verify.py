@@ -153,7 +153,7 @@ def write_rows(rows: Sequence[Row], study: Claimant, results: Path, out: Path) -
         write_json(paths[0], as_json(rows, study, results))
         write_bytes(paths[1], as_markdown(rows, study, results).encode())
     except OSError as error:
-        raise UserError(f"--out {out}: cannot write there ({error.strerror})") from error
+        raise UserError(f"--out {out}: not writable ({error.strerror})") from error
     return paths
 
 

@@ -1,1 +1,1 @@
-"""Configurations: profiles, the values of settings as text, and their resolution with every value's source."""
+"""Configurations: profiles, settings as text, and resolution that records the source of every value."""

@@ -1,4 +1,4 @@
-"""Profiles: named sets of settings, in the order of growing cost. A study may add its own."""
+"""Profiles: named sets of settings, in order of increasing cost. A study may define more."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from codesign_bench.registry import load_attribute, names
 DEFAULT_PROFILE = "laptop"
 
 Hyperparameters = Callable[[str, str], Settings]
-"""Maps the names of a method and of a task to the hyperparameters that a profile sets for them."""
+"""Maps the names of a method and a task to the hyperparameters that a profile sets for them."""
 
 
 def no_hyperparameters(method_name: str, task_name: str) -> Settings:
-    """Return nothing, for every method and task."""
+    """Return no settings, for every method and task."""
     return {}
 
 
 @dataclass(frozen=True)
 class Profile:
-    """What is set for a purpose: how long cells train, and which hyperparameters they have.
+    """Settings for one purpose: how long cells train, and with which hyperparameters.
 
-    Methods and tasks add what they know under its name: see `Method.profile` and `Task.run_settings`.
+    Methods and tasks add their own settings under the profile's name: see `Method.profile` and `Task.run_settings`.
     """
 
     name: str
     help: str
-    """What it is for, in one line."""
+    """Its purpose, in one line."""
     run: Settings = field(default_factory=dict)
     """Run settings for every task."""
     hyperparameters: Hyperparameters = no_hyperparameters
-    """Hyperparameters, which come after what the method itself sets."""
+    """Hyperparameters; they override those of `Method.profile`."""
     most_seeds: int | None = None
-    """Most seeds of a cell in experiments; None: as many as the study says."""
+    """Largest number of seeds in experiments; None: the study's number."""
 
 
 BUILT_IN: Mapping[str, Profile] = {
@@ -49,7 +49,7 @@ BUILT_IN: Mapping[str, Profile] = {
         ),
         Profile(
             "laptop",
-            "an hour or two per 2D task on two cores (default)",
+            "under an hour per 2D task on two cores (default)",
             sourced({"steps": 1_000_000, "evaluations": 20}, "ours"),
         ),
     )
@@ -57,7 +57,7 @@ BUILT_IN: Mapping[str, Profile] = {
 
 
 def profiles() -> dict[str, Profile]:
-    """Return all profiles by name: the built-in ones, then those of every known study."""
+    """Return all profiles by name: the built-in ones, then those of every study."""
     return {**BUILT_IN, **{profile.name: profile for study in names("studies") for profile in _of_study(study)}}
 
 
@@ -67,7 +67,7 @@ def profile_named(name: str) -> Profile:
     Raises:
         UserError: there is no such profile.
     """
-    if name in BUILT_IN:  # without importing any study
+    if name in BUILT_IN:  # without importing a study
         return BUILT_IN[name]
     known = profiles()
     if name not in known:

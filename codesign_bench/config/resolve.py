@@ -1,4 +1,4 @@
-"""Resolve a cell's configuration: defaults, then the profile, then the command line; every value keeps its source."""
+"""Resolve a cell's configuration: defaults, profile, command line; the source of every value is recorded."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from codesign_bench.method import Method
 from codesign_bench.task import load_task
 
 ABSENT = "absent"
-"""Stands for the value of a setting that a configuration does not have."""
+"""Shown instead of a value if a configuration does not have the setting."""
 
 
 @dataclass(frozen=True)
 class ResolvedConfig:
-    """Everything a cell is run with."""
+    """The complete configuration of a cell."""
 
     run: RunSettings
     method: Any
     """An instance of the method's `config_class`."""
     sources: Mapping[str, str]
-    """Where each value comes from; keys `run.<name>` and `method.<name>`."""
+    """The source of each value; keys `run.<name>` and `method.<name>`."""
 
     def stored(self) -> StoredConfig:
-        """Return it as a cell file holds it."""
+        """Return the configuration in the form of a cell file."""
         parts = {RUN: self.run, METHOD: self.method}
         return StoredConfig(
             **{
@@ -53,17 +53,18 @@ def resolve(
 ) -> ResolvedConfig:
     """Return the configuration of `method_class` on a task under `profile`.
 
-    A value comes from the last of these that sets it: the class's default, the profile (what it sets for all, what the
-    task or the method says under its name, what it sets for this method), `--steps`, `--set`, and the variant.
+    A value comes from the last of these that sets it: the class's default, the profile (its settings for all cells,
+    then those of the task or the method for this profile, then its settings for this method), `--steps`, `--set`, and
+    the variant.
 
     Args:
-        method_class: whose configuration.
-        task_name: a known task.
-        profile: a known profile.
+        method_class: the method.
+        task_name: name of a task.
+        profile: name of a profile.
         overrides: `key=value` or `prefix.key=value` with a method's name or `run` as prefix; keys of other methods are
-            passed over.
+            ignored.
         steps: the budget of `--steps`, or None for the profile's.
-        variant_overrides: what the cell's variant stands for, in the same form.
+        variant_overrides: the overrides of the cell's variant, in the same form.
 
     Raises:
         UserError: an unknown task or profile, a value of the wrong type or out of range.
@@ -103,10 +104,10 @@ def resolve(
 
 
 def check_overrides(overrides: Iterable[str], method_classes: Sequence[type[Method[Any]]]) -> None:
-    """Refuse an override that no selected method and no run setting knows.
+    """Check that every override sets a key of a selected method or a run setting.
 
     Raises:
-        UserError: naming the override and the keys there are.
+        UserError: one does not; the message names it and the valid keys.
     """
     run_keys = [field.name for field in fields(RunSettings)]
     for override in overrides:
@@ -116,7 +117,7 @@ def check_overrides(overrides: Iterable[str], method_classes: Sequence[type[Meth
         known += run_keys if prefix in (None, RUN) else []
         if not known:
             choices = ", ".join([RUN, *(method.name for method in method_classes)])
-            raise UserError(f"--set {override}: '{prefix}' is none of the selected methods; choose from: {choices}")
+            raise UserError(f"--set {override}: '{prefix}' is not a selected method; choose from: {choices}")
         if key not in known:
             raise UserError(f"--set {override}: unknown key '{key}'; choose from: {', '.join(dict.fromkeys(known))}")
 
@@ -125,7 +126,7 @@ def split_override(override: str) -> tuple[str | None, str, str]:
     """Split `prefix.key=value` into prefix (None if there is none), key and value.
 
     Raises:
-        UserError: it has another form.
+        UserError: it has a different form.
     """
     name, equals, text = override.partition("=")
     prefix, dot, key = name.strip().rpartition(".")
@@ -138,21 +139,21 @@ def method_config(config_class: type, stored: Settings) -> Any:
     """Rebuild a method's configuration from the `method` part of a `StoredConfig`.
 
     Raises:
-        UserError: it does not fit the method's present configuration.
+        UserError: it is incompatible with the method's current configuration.
     """
     hints = typing.get_type_hints(config_class)
     try:
         values = {name: _restore(hints[name], entry.value) for name, entry in stored.items()}
         return config_class(**values)
     except (KeyError, TypeError, ValueError) as error:
-        raise UserError(f"the stored configuration does not fit {config_class.__qualname__}: {error}") from error
+        raise UserError(f"stored configuration incompatible with {config_class.__qualname__}: {error}") from error
 
 
 def differences(stored: StoredConfig, resolved: ResolvedConfig) -> list[str]:
     """Return "name: stored X, requested Y" for each value in which a stored and a resolved configuration differ.
 
-    A name that the stored configuration lacks did not exist when it was stored: it counts as the class's default,
-    which is why a new hyperparameter's default must mean "as before".
+    A name that is missing in the stored configuration did not exist at that time. It then has the class's default, so
+    the default of a new hyperparameter must keep the previous behaviour.
     """
     found = []
     requested = resolved.stored()
@@ -167,7 +168,7 @@ def differences(stored: StoredConfig, resolved: ResolvedConfig) -> list[str]:
 
 
 def _start(config_class: type, profile: Settings) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return the defaults of a dataclass with a profile laid over them, and every value's source."""
+    """Return the defaults of a dataclass, overridden by a profile, and every value's source."""
     defaults = config_class()
     values = {field.name: getattr(defaults, field.name) for field in fields(defaults)}
     sources = {field.name: str(field.metadata.get("source", "default")) for field in fields(defaults)}

@@ -1,4 +1,4 @@
-"""The run settings: what the runner owns, whatever the method."""
+"""The run settings: settings of the runner, the same for all methods."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ PRECISIONS = ("fp32", "auto")
 
 @dataclass(frozen=True)
 class RunSettings:
-    """What a cell is run with beside its method's hyperparameters; these values hold where a profile sets nothing."""
+    """Settings of a cell other than its method's hyperparameters, with defaults that a profile may override."""
 
     steps: int = 1_000_000
-    """Budget in environment steps; design steps and the steps of every candidate count."""
+    """Budget in environment steps, including design steps and the steps of every candidate."""
     evaluations: int = 25
-    """Evaluations after the first, which judges the untrained policy."""
+    """Number of evaluations, not counting the first, which evaluates the untrained policy."""
     fine_tuning_steps: int = 100_000
-    """Budget of cells that train on one instance alone (--finetune, --scratch)."""
+    """Budget of cells that train on a single instance (--finetune, --scratch)."""
     tradeoff_scale: float = 1.0
-    """K of equation 1; used with --alpha alone, the paper has K = 0 elsewhere."""
+    """K of equation 1; used only with --alpha, since the paper has K = 0 elsewhere."""
     threads: int = 1
-    """Cores of one cell: rollouts in processes, updates of policy and value in threads; no result depends on it."""
+    """Cores of one cell: rollouts in processes, updates of policy and value in threads; results do not depend on it."""
     device: str = "cpu"
-    """Where networks are updated: cpu or cuda. Rollouts always run on the processor; sums of floats depend on it."""
+    """Device of network updates: cpu or cuda. Rollouts always run on the CPU. Floating-point results depend on it."""
 
     def __post_init__(self) -> None:
         if self.device not in DEVICES:
-            raise ValueError(f"device is one of {', '.join(DEVICES)}, not '{self.device}'")
+            raise ValueError(f"device must be one of {', '.join(DEVICES)}, not '{self.device}'")
         for name in ("steps", "evaluations", "fine_tuning_steps", "threads"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")

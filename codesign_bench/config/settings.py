@@ -1,4 +1,4 @@
-"""Values of settings that know where they come from, and how they look on disk."""
+"""Values of settings with their sources, and their form on disk."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
 RUN, METHOD = "run", "method"
-"""The two parts of a configuration: what the runner owns, and the method's hyperparameters."""
+"""The two parts of a configuration: the runner's settings and the method's hyperparameters."""
 
 
 class Sourced(NamedTuple):
@@ -15,7 +15,7 @@ class Sourced(NamedTuple):
 
     value: Any
     source: str
-    """Who chose it: a table of a paper, "ours", a profile, an option of the command line."""
+    """Origin of the value: a table of a paper, "ours", a profile, or an option of the command line."""
 
 
 Settings: TypeAlias = Mapping[str, Sourced]
@@ -29,7 +29,7 @@ def sourced(values: Mapping[str, Any], source: str) -> dict[str, Sourced]:
 
 @dataclass(frozen=True)
 class StoredConfig:
-    """A configuration as a cell file holds it: plain JSON values, each with its source."""
+    """A configuration in the form of a cell file: plain JSON values, each with its source."""
 
     run: Settings = field(default_factory=dict)
     method: Settings = field(default_factory=dict)
@@ -47,10 +47,10 @@ class StoredConfig:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> StoredConfig:
-        """Return what `to_json` wrote.
+        """Return the configuration that `to_json` wrote.
 
         Raises:
-            KeyError, TypeError, AttributeError: `content` has another form.
+            KeyError, TypeError, AttributeError: `content` has a different form.
         """
         return cls(
             **{

@@ -1,4 +1,4 @@
-"""Checks of hyperparameters; a value that cannot be is told before anything runs."""
+"""Checks of hyperparameters: invalid values are reported before anything runs."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 
 def check_range(config: Any, low: float, high: float, *names: str) -> None:
-    """Check that the fields `names` of a configuration, numbers or tuples of them, lie in [low, high].
+    """Check that the fields `names` of a configuration, numbers or tuples of numbers, are in [low, high].
 
     Raises:
-        ValueError: naming the first that does not.
+        ValueError: one is not; names the first.
     """
     for name in names:
         value = getattr(config, name)
@@ -20,10 +20,10 @@ def check_range(config: Any, low: float, high: float, *names: str) -> None:
 
 
 def check_given(config: Any, *names: str) -> None:
-    """Check that the tuples `names` of a configuration hold something.
+    """Check that the tuples `names` of a configuration are not empty.
 
     Raises:
-        ValueError: naming the first that does not.
+        ValueError: one is empty; names the first.
     """
     for name in names:
         if not getattr(config, name):
@@ -31,10 +31,10 @@ def check_given(config: Any, *names: str) -> None:
 
 
 def check_choices(config: Any) -> None:
-    """Check that the fields of a configuration that are literals hold one of their choices.
+    """Check that every literal field of a configuration has one of its choices.
 
     Raises:
-        ValueError: naming the first that does not, and its choices.
+        ValueError: one does not; names the first and its choices.
     """
     for name, hint in get_type_hints(type(config)).items():
         if get_origin(hint) is Literal and getattr(config, name) not in get_args(hint):

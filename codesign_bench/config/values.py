@@ -1,4 +1,4 @@
-"""Values of settings as text: how `--set` and other options are read."""
+"""Parse values of settings from text, for `--set` and other options."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 
 
 def parse_value(annotation: Any, text: str) -> Any:
-    """Return `text` as a value of the type `annotation`: int, float, bool, str, a literal, a tuple, or None.
+    """Parse `text` as the type `annotation`: int, float, bool, str, a literal, a tuple, or None.
 
     Raises:
-        ValueError: it is none; the message says what was expected.
+        ValueError: it is not of this type; the message says what was expected.
     """
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
     if origin in (typing.Union, types.UnionType):
@@ -38,10 +38,10 @@ def parse_value(annotation: Any, text: str) -> Any:
 
 
 def parse_int(text: str) -> int:
-    """Return an integer written as 150000, 150_000 or 1.5e5.
+    """Parse an integer written as 150000, 150_000 or 1.5e5.
 
     Raises:
-        ValueError: it is none.
+        ValueError: it is not an integer.
     """
     try:
         number = float(text)

@@ -80,7 +80,7 @@ def load_deployment(results: str | Path) -> pd.DataFrame:
     paths = sorted(Path(results).glob(f"{FOLDER}/*/{PROTOCOL_FILE}"))
     if not paths:
         raise UserError(
-            f"no deployment in '{results}' yet; make one with: codesign-bench deploy --policy CELL --protocol "
+            f"no deployment in '{results}' yet; create one with: codesign-bench deploy --policy CELL --protocol "
             f"--out {results}"
         )
     return pd.concat([pd.read_csv(path) for path in paths], ignore_index=True)

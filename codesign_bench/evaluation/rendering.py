@@ -59,7 +59,7 @@ def render(task: Task, behaviour: Behaviour, path: Path, episodes: int = 4) -> s
         path.parent.mkdir(parents=True, exist_ok=True)
         write_bytes(path, content)
     except OSError as error:
-        raise UserError(f"--out {path}: cannot write there ({error.strerror})") from error
+        raise UserError(f"--out {path}: not writable ({error.strerror})") from error
     return f"{path}: {solved} of {len(moments[-1].captions)} episodes solved"
 
 

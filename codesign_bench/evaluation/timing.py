@@ -60,7 +60,7 @@ def timing_frame(results: Path) -> pd.DataFrame:
         )
         timed.add(pair)
     if not rows:
-        raise UserError(f"no finished cell in '{results}' yet; make some with: codesign-bench run --out {results}")
+        raise UserError(f"no finished cell in '{results}' yet; create some with: codesign-bench run --out {results}")
     return pd.DataFrame(rows)
 
 

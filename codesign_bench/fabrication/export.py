@@ -152,7 +152,7 @@ def _open(out: Path, files: Iterable[str]) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise UserError(f"--out {out}: cannot write there ({error.strerror})") from error
+        raise UserError(f"--out {out}: not writable ({error.strerror})") from error
     for name in (TABLE_FILE, *files):
         if (out / name).exists():
             raise UserError(f"--out {out}: {name} is there already; choose another folder")

@@ -52,7 +52,7 @@ def tool_solid(task: Task, design: Floats, scale: float = 1.0) -> Solid:
         scale: size of the solid over the tool's own.
 
     Raises:
-        UserError: the extra `export` is not installed, or the task does not say what its tools are made of.
+        UserError: the extra `export` is not installed, or the task does not define the parts of its tools.
     """
     handle, tool = handle_of(task), task.tool_parts(design)
     joints = [*task.tool_graph.edges]

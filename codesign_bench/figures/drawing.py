@@ -73,7 +73,7 @@ def draw_figures(
         choices = [name for name, module in known.items() if getattr(module, "COMPARES", False)]
         raise UserError(f"--compare: {', '.join(wanted)} show no curves; choose from: {', '.join(choices)}")
     if not wanted and not results.is_dir():
-        raise UserError(f"no results folder '{results}'; make one with: codesign-bench run --out {results}")
+        raise UserError(f"no results folder '{results}'; create one with: codesign-bench run --out {results}")
     if compare is not None:
         load_results(compare)  # a wrong folder is an error, not a reason to leave the curves out
     make_folder(out)
@@ -175,4 +175,4 @@ def make_folder(out: Path) -> None:
         write_bytes(out / ".writable", b"")
         (out / ".writable").unlink()
     except OSError as error:
-        raise UserError(f"--out {out}: cannot write there ({error.strerror})") from error
+        raise UserError(f"--out {out}: not writable ({error.strerror})") from error

@@ -1,1 +1,1 @@
-"""What several methods share: networks, advantages, rollouts of whole episodes, PPO for two phases, CMA-ES."""
+"""Building blocks of the methods: networks, advantages, rollouts of whole episodes, two-phase PPO, CMA-ES."""

@@ -1,6 +1,6 @@
-"""The actor of a two-phase PPO learner: a Gaussian over designs and one over controls.
+"""The actor of a two-phase PPO learner: one Gaussian over designs and one over controls.
 
-Shapes: `b` slots that take a step at once, `B` batch, `O` observation, `A` action, `D` design, `C` control.
+Shapes: `b` slots that step together, `B` batch, `O` observation, `A` action, `D` design, `C` control.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from codesign_bench.learning.network_policy import NetworkPolicy
 from codesign_bench.task import Singles, Slots
 
 Distribution = Callable[[Tensor], tuple[Tensor, Tensor]]
-"""Maps observations (B, O) to mean (B, A) and log standard deviation (A,) of actions."""
+"""Maps observations (B, O) to the mean (B, A) and log standard deviation (A,) of actions."""
 
 LOG_PROB = "log_prob"
-"""The extra (b,) of a `GaussianExplorer`: log-probabilities of its actions."""
+"""The extra (b,) that a `GaussianExplorer` stores: log-probabilities of its actions."""
 LOG_SQRT_TWO_PI = 0.5 * float(np.log(2.0 * np.pi))
 
 
 class Actor(nn.Module):
-    """Designer and controller. `fix_std` decides whether the log standard deviations are learned."""
+    """Designer and controller. The log standard deviations are learned unless `fix_std` is set."""
 
     design_log_std: nn.Parameter
     control_log_std: nn.Parameter
@@ -53,11 +53,11 @@ class Actor(nn.Module):
 
     @abstractmethod
     def update_statistics(self, observation: Tensor, is_design: Tensor) -> None:
-        """Take a batch's observations (B, O) into the running normalisation; `is_design` (B,) marks design steps."""
+        """Update the running normalisation with observations (B, O); `is_design` (B,) marks design steps."""
 
 
 class GaussianExplorer(Explorer):
-    """Samples an actor's Gaussians; reports the log-probability of every action."""
+    """Samples from an actor's Gaussians and stores the log-probability of every action."""
 
     def __init__(self, actor: Actor) -> None:
         super().__init__(actor.design_log_std.numel(), actor.control_log_std.numel())
@@ -80,12 +80,16 @@ class ActorPolicy(NetworkPolicy):
 
 
 def gaussian_log_prob(noise: Singles, log_std: Singles) -> Singles:
-    """Return the (b,) log-probability of mean + exp(log_std) noise for standard-normal `noise` (b, A)."""
+    """Return the (b,) log-probabilities of mean + exp(log_std) noise for standard-normal `noise` (b, A)."""
+    # From the noise itself instead of (action - mean) / std, which would add rounding errors. This is the density of
+    # the action before it is clipped to [-1, 1]: a clipped Gaussian has no density at the bounds, and the loss
+    # evaluates the new policy at the same unclipped action, so the ratio is exact.
     result: Singles = -0.5 * (noise**2).sum(axis=-1) - (log_std + LOG_SQRT_TWO_PI).sum()
     return result
 
 
 def _sample(distribution: Distribution, observation: Singles, noise: Singles) -> Sample:
+    # The episode clips the sample, not this function: the learner needs the action that the Gaussian produced.
     with torch.inference_mode():
         mean, log_std = (values.numpy() for values in distribution(torch.from_numpy(observation)))
     return Sample(mean + np.exp(log_std) * noise, {LOG_PROB: gaussian_log_prob(noise, log_std)})

@@ -1,9 +1,9 @@
-"""Collect a batch: divide its slots into groups and play these, here or in processes side by side.
+"""Collect a batch: split its slots into groups and play the groups, in this process or in parallel processes.
 
 Shapes: `S` slots of a batch.
 
-Each group has its own random stream and its own batched calls of the explorer. How many groups there are follows from
-the number of slots alone, so no number depends on how many processes play them.
+Each group has its own random stream and its own batched calls of the explorer. The number of groups depends only on the
+number of slots, so results do not depend on the number of processes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from codesign_bench.method import Problem
 from codesign_bench.seeding import Streams
 
 GROUP_SLOTS = 96
-"""A group has at least this many slots, unless the batch has fewer: smaller calls of the policy cost more per step."""
+"""Fewest slots of a group, unless the batch has fewer: smaller calls of the policy cost more per step."""
 
 
 class BatchCollector:
@@ -30,7 +30,7 @@ class BatchCollector:
         self._pool: RolloutPool | None = None
 
     def use_cores(self, count: int) -> None:
-        """Play groups in up to `count` processes; no number changes."""
+        """Play groups in up to `count` processes; results do not change."""
         self._pool = RolloutPool(self.problem, count) if count > 1 else None
 
     def collect(self, explorer: Explorer, steps: int, num_slots: int | None = None) -> Trajectories:
@@ -39,7 +39,7 @@ class BatchCollector:
         Args:
             explorer: chooses designs and controls.
             steps: environment steps wanted; the last episode of every slot is finished.
-            num_slots: S, the episodes played at once; None: as many as give one full-length episode each.
+            num_slots: S, the number of parallel episodes; None: one full-length episode per slot.
         """
         groups = self._groups(steps, num_slots or slots_for(steps, self.problem.task.horizon + 1))
         if self._pool is not None and len(groups) > 1:
@@ -56,16 +56,17 @@ class BatchCollector:
 
 
 def slots_for(steps: int, episode_steps: int, most: int | None = None) -> int:
-    """Return how many slots, at most `most`, fill `steps` steps with one episode of `episode_steps` steps each."""
+    """Return the number of slots, at most `most`, whose episodes of `episode_steps` steps fill `steps` steps."""
     wanted = max(1, round(steps / episode_steps))
     return wanted if most is None else min(wanted, most)
 
 
 def group_sizes(num_slots: int, max_slots: int) -> list[int]:
-    """Return the sizes of the groups that `num_slots` slots form: one, or an even number, as equal as can be.
+    """Split `num_slots` slots into one group or an even number of groups of near-equal size; return the sizes.
 
-    No group has more than `max_slots`, the most that the task's simulators may have.
+    No group has more than `max_slots`, the limit of the task's simulators.
     """
+    # An even number of near-equal groups keeps two processes busy until the end of the batch.
     pairs = num_slots // (2 * GROUP_SLOTS)
     if num_slots > max_slots:
         pairs = max(pairs, -(-num_slots // (2 * max_slots)))

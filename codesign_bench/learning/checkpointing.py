@@ -1,4 +1,4 @@
-"""Networks and optimizers as arrays by name, and back: what checkpoints and policy files hold."""
+"""Convert networks and optimizers to named arrays and back, for checkpoints and policy files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Optimizers = Mapping[str, torch.optim.Optimizer]
 
 
 def learner_arrays(modules: Modules, optimizers: Optimizers) -> dict[str, Array]:
-    """Return copies of everything that `modules` and `optimizers` have learned, as arrays by name."""
+    """Return copies of the state of `modules` and `optimizers` as arrays by name."""
     arrays: dict[str, Array] = {}
     for name, module in modules.items():
         arrays |= _prefixed(f"{name}.", module_arrays(module))
@@ -28,7 +28,7 @@ def learner_arrays(modules: Modules, optimizers: Optimizers) -> dict[str, Array]
 
 
 def load_learner_arrays(modules: Modules, optimizers: Optimizers, arrays: Mapping[str, Array]) -> None:
-    """Restore what `learner_arrays` returned.
+    """Restore the arrays that `learner_arrays` returned.
 
     Raises:
         RuntimeError: names or shapes differ from the modules'.
@@ -45,7 +45,7 @@ def module_arrays(module: nn.Module) -> dict[str, Array]:
 
 
 def load_module_arrays(module: nn.Module, arrays: Mapping[str, Array]) -> None:
-    """Restore what `module_arrays` returned.
+    """Restore the arrays that `module_arrays` returned.
 
     Raises:
         RuntimeError: names or shapes differ from the module's.
@@ -63,7 +63,7 @@ def optimizer_arrays(optimizer: torch.optim.Optimizer) -> dict[str, Array]:
 
 
 def load_optimizer_arrays(optimizer: torch.optim.Optimizer, arrays: Mapping[str, Array]) -> None:
-    """Restore what `optimizer_arrays` returned; the step size stays as it is."""
+    """Restore the arrays that `optimizer_arrays` returned; the learning rate is unchanged."""
     state: dict[int, dict[str, Tensor]] = {}
     for key, array in arrays.items():
         index, name = key.split(".")

@@ -2,8 +2,8 @@
 
 Shapes: `P` candidates of a generation, `X` parameters, `K` instances.
 
-All of pycma's state follows from its random numbers and from the fitness values that it was told. So its state on disk
-is the fitness history: going on means asking and telling the same generations again, which gives the same numbers.
+The state of pycma is a function of its random numbers and the fitness values. So the saved state is the fitness
+history: to resume, the same generations are asked and told again, which gives the same numbers.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class EvolutionConfig:
     popsize: int = 24
     """Candidates of a generation."""
     sigma0: float = 0.1
-    """Initial standard deviation; parameters lie in [-1, 1]."""
+    """Initial standard deviation; parameters are in [-1, 1]."""
     center_learning_rate: float = field(default=1.0, metadata=PYCMA)
     """Learning rate of the mean (pycma's `CMA_cmean`)."""
     covariance_learning_rate: float = field(default=1.0, metadata=PYCMA)
@@ -46,10 +46,10 @@ class EvolutionConfig:
 
 
 class Evolution:
-    """Maximises a fitness over [-1, 1]^X, one generation after the other."""
+    """Maximises a fitness over [-1, 1]^X, generation by generation."""
 
     def __init__(self, size: int, config: EvolutionConfig, rng: np.random.Generator) -> None:
-        own = rng.spawn(1)[0]  # Its own generator, so that nothing else shifts what a replay draws.
+        own = rng.spawn(1)[0]  # a separate generator, so that other draws do not shift the numbers of a replay
         options = {
             "popsize": config.popsize,
             "bounds": [-1.0, 1.0],
@@ -57,6 +57,7 @@ class Evolution:
             "CMA_on": config.covariance_learning_rate,
             "CMA_rankmu": config.rank_mu_learning_rate,
             "CMA_rankone": config.rank_one_learning_rate,
+            # pycma would draw from numpy's global generator; `seed` NaN keeps it from seeding that one.
             "randn": lambda *shape: own.standard_normal(shape),
             "seed": np.nan,
             "verbose": -9,
@@ -69,7 +70,7 @@ class Evolution:
         self.history: list[list[float]] = []
 
     def ask(self) -> Floats:
-        """Return the candidates (P, X) of the generation at hand; asking again before `tell` returns the same."""
+        """Return the candidates (P, X) of the current generation; a second call before `tell` returns the same."""
         if self._asked is None:
             self._asked = self._strategy.ask()
         return np.array(self._asked)
@@ -77,18 +78,19 @@ class Evolution:
     def tell(self, fitness: Floats) -> None:
         """End the generation with the fitness (P,) of its candidates; larger is better."""
         self.ask()
+        # pycma minimises, so the fitness changes its sign.
         self._strategy.tell(self._asked, (-fitness).tolist())
         self.history.append(fitness.tolist())
         self._asked = None
 
     @property
     def mean(self) -> Floats:
-        """The distribution's mean (X,), inside the bounds."""
+        """The mean (X,) of the search distribution, inside the bounds."""
         return np.array(self._strategy.result.xfavorite)
 
     @property
     def sigma(self) -> float:
-        """The distribution's overall standard deviation."""
+        """The overall standard deviation of the search distribution."""
         return float(self._strategy.sigma)
 
     @property
@@ -106,7 +108,7 @@ class Evolution:
         }
 
     def replay(self, history: Floats) -> None:
-        """Go through generations with the fitness (generations, P) again, on a fresh object with the same generator."""
+        """Repeat generations with the stored fitness (generations, P), on a new object with the same generator."""
         for fitness in history:
             self.tell(fitness)
 

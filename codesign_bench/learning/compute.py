@@ -1,4 +1,4 @@
-"""Where and how precisely updates compute.
+"""Device and precision of updates.
 
 Shapes: `m` rows of a minibatch, `O` observation, `A` action.
 """
@@ -18,13 +18,13 @@ from codesign_bench.learning.ppo_config import Precision
 
 CPU = torch.device("cpu")
 BLOCK = 64
-"""Rows of observations come in multiples of this where products are compiled for their shape (ours)."""
+"""Rows of observations are padded to multiples of this where kernels are compiled per shape (ours)."""
 
 
 class Compute:
-    """The device of a learner's updates, and the precision of their products.
+    """The device of a learner's updates, and the precision of their matrix products.
 
-    Networks live on the processor, where rollouts use them, and visit the device for the time of an update.
+    Networks are on the CPU for rollouts; they are moved to the device for the duration of an update.
     """
 
     def __init__(self, precision: Precision = "fp32", block: int = BLOCK) -> None:
@@ -33,12 +33,12 @@ class Compute:
 
     @property
     def reduced(self) -> bool:
-        """Whether products are computed in less than single precision."""
+        """Whether matrix products are computed in less than single precision."""
         return self.precision != "fp32"
 
     @contextmanager
     def holding(self, modules: Modules, optimizers: Optimizers) -> Iterator[None]:
-        """Bring networks and optimizers to the device, and back to the processor at the end."""
+        """Move networks and optimizers to the device, and back to the CPU at the end of the `with` block."""
         if self.device == CPU:
             yield
             return
@@ -56,6 +56,8 @@ class Compute:
         """Return mean (m, A) and log standard deviation (A,) of a phase's actions for observations (m, O)."""
         with self._autocast():
             mean, log_std = phase(observation)
+        # Back to single precision before anything is exponentiated: a ratio of probabilities is close to one, and
+        # bfloat16 has steps of 1/128 there, a considerable part of the clipping range.
         return mean.float(), log_std
 
     def predict(self, network: Callable[[Tensor], Tensor], observation: Tensor) -> Tensor:
@@ -65,10 +67,10 @@ class Compute:
         return values.float()
 
     def whole_blocks(self, observation: Tensor) -> Tensor:
-        """Return observations (m, O), in reduced precision with rows of zeros up to a multiple of the block.
+        """Return observations (m, O); in reduced precision, padded with rows of zeros to a multiple of the block.
 
-        The share of design steps differs between minibatches, and the library behind such products compiles and keeps a
-        kernel for every number of rows: hundreds of megabytes.
+        The number of design steps differs between minibatches, and the library behind reduced-precision products
+        compiles and caches a kernel for every number of rows, which would take hundreds of megabytes.
         """
         missing = -len(observation) % self.block if self.reduced else 0
         return nn.functional.pad(observation, (0, 0, 0, missing)) if missing else observation

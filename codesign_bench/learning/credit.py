@@ -1,12 +1,12 @@
-"""Who is credited with an episode's outcome: three ways to learn, or not to learn, the design step.
+"""Credit assignment for the design step: three ways to train the designer, or not to train it.
 
 Shapes: `n` valid steps of a batch, `d` its design steps, `m` rows of a minibatch, `O` observation, `D` design,
 `C` control.
 
-`JointCredit`, the paper's: the design step is one more step of the episode, with the discounted advantage of every
-other step, in the same minibatches. `SeparateCredit` (ours, after the temporal credit assignment of BodyGen, 2025): its
-advantage is the undiscounted return minus a second value network's, normalised apart, with its own updates and its own
-KL stop. `NoCredit`: designs are chosen by something else than the policy gradient.
+`JointCredit` (the paper's): the design step is an ordinary step of the episode, with a discounted advantage, in the
+same minibatches as the control steps. `SeparateCredit` (ours, after the temporal credit assignment of BodyGen, 2025):
+the design step's advantage is the undiscounted return minus the prediction of a second value network, normalised
+separately; the designer has its own updates and its own KL stop. `NoCredit`: designs are not chosen by the policy.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from codesign_bench.task import Slots, Task
 
 @dataclass(frozen=True)
 class Steps:
-    """Valid steps of a batch as tensors on the device of updates."""
+    """The valid steps of a batch as tensors on the device of updates."""
 
     observation: Tensor
     """(n, O)"""
@@ -44,7 +44,7 @@ class Steps:
     control: Tensor
     """(n, C)"""
     log_prob: Tensor
-    """(n,) of the actions, under the policy that took them."""
+    """(n,) log-probabilities of the actions under the policy that took them."""
 
     @classmethod
     def of(cls, batch: Trajectories, compute: Compute) -> Steps:
@@ -54,25 +54,25 @@ class Steps:
 
 
 class DesignCredit(ABC):
-    """How the design step is learned beside the control steps."""
+    """How the design step is learned in addition to the control steps."""
 
     def __init__(self, actor: Actor, compute: Compute) -> None:
         self.actor, self.compute = actor, compute
         self.modules: dict[str, nn.Module] = {}
-        """Its own networks by name."""
+        """Additional networks by name."""
         self.optimizers: dict[str, torch.optim.Optimizer] = {}
-        """Its own optimizers by name."""
+        """Additional optimizers by name."""
 
     def policy_parameters(self) -> list[nn.Parameter]:
-        """Return what the batch's policy update trains: the controller, unless a credit says more."""
+        """Return the parameters that the batch's policy update trains: by default the controller's."""
         return self.actor.control_parameters()
 
     def learned(self, is_design: Tensor) -> Tensor:
-        """Return which steps (n,) the batch's policy update learns from: control steps, unless a credit says more."""
+        """Return which steps (n,) the batch's policy update learns from: by default the control steps."""
         return ~is_design
 
     def log_probs(self, steps: Steps) -> LogProbs:
-        """Return the function from rows of `steps` to log-probabilities and mean entropy."""
+        """Return the function that maps rows of `steps` to log-probabilities and mean entropy."""
 
         def of_controls(rows: Slots) -> tuple[Tensor, Tensor]:
             index = self.compute.tensor(rows)
@@ -83,11 +83,11 @@ class DesignCredit(ABC):
 
     @abstractmethod
     def learn(self, batch: Trajectories) -> dict[str, float]:
-        """Learn from the design steps apart from the batch's policy update; return the logged values."""
+        """Learn from the design steps outside of the batch's policy update; return the logged values."""
 
 
 class NoCredit(DesignCredit):
-    """Designs are given: only control steps are learned."""
+    """Designs are fixed: only control steps are learned."""
 
     def learn(self, batch: Trajectories) -> dict[str, float]:
         """Learn nothing."""
@@ -95,10 +95,10 @@ class NoCredit(DesignCredit):
 
 
 class JointCredit(DesignCredit):
-    """The design step is learned like every other step."""
+    """The design step is learned like any other step."""
 
     def policy_parameters(self) -> list[nn.Parameter]:
-        """Return the parameters of controller and designer, those that they share once."""
+        """Return the parameters of controller and designer, with shared ones listed once."""
         control = self.actor.control_parameters()
         known = {id(p) for p in control}
         return control + [p for p in self.actor.design_parameters() if id(p) not in known]
@@ -108,36 +108,37 @@ class JointCredit(DesignCredit):
         return torch.ones_like(is_design)
 
     def log_probs(self, steps: Steps) -> LogProbs:
-        """Return the function from rows of `steps` to log-probabilities and mean entropy over both phases."""
+        """Return the function that maps rows of `steps` to log-probabilities and mean entropy over both phases."""
 
         def of_both(rows: Slots) -> tuple[Tensor, Tensor]:
             index = self.compute.tensor(rows)
             designing = steps.is_design[index]
             log_prob, entropy = steps.observation.new_zeros(len(rows)), steps.observation.new_zeros(())
-            # Each network sees the rows of its own phase alone, which is less work than both networks for all rows and
-            # a choice afterwards; masked_scatter then puts the results back in the rows' order.
+            # Each network is evaluated only on the rows of its phase, which is less work than both networks on all rows
+            # and a selection afterwards. masked_scatter restores the order of the rows; gradients pass through it.
             for phase, action, where in (
                 (self.actor.control, steps.control, ~designing),
                 (self.actor.design, steps.design, designing),
             ):
-                if where.any():  # A small minibatch may hold no design step.
+                if where.any():  # a small minibatch may contain no design step
                     chosen = index[where]
                     observation = self.compute.whole_blocks(steps.observation[chosen])
                     mean, log_std = self.compute.distribution(phase, observation)
                     part, part_entropy = gaussian(mean[: len(chosen)], log_std, action[chosen])
                     log_prob = log_prob.masked_scatter(where, part)
+                    # Weighted by the phase's share of rows: the mean entropy of the actions taken.
                     entropy = entropy + where.float().mean() * part_entropy
             return log_prob, entropy
 
         return of_both
 
     def learn(self, batch: Trajectories) -> dict[str, float]:
-        """Learn nothing more: the batch's policy update has learned from all steps."""
+        """Do nothing: the batch's policy update has learned from all steps."""
         return {}
 
 
 class SeparateCredit(DesignCredit):
-    """Each design is credited with its episode's whole return, and learned by its own updates."""
+    """Each design is credited with the undiscounted return of its episode, and learned by separate updates."""
 
     def __init__(
         self, task: Task, config: PPOConfig, streams: Streams, actor: Actor, compute: Compute, loop: UpdateLoop
@@ -150,14 +151,16 @@ class SeparateCredit(DesignCredit):
         self.optimizers["design_value"] = adam(self.value.parameters(), config.value_learning_rate)
 
     def learn(self, batch: Trajectories) -> dict[str, float]:
-        """Improve designer and design value on the design steps (d,) of `batch`."""
+        """Update the designer and its value network on the design steps (d,) of `batch`."""
         config, tensor = self.config, self.compute.tensor
         where = batch.is_design & batch.valid
         observation, design = tensor(batch.observation[where]), tensor(batch.design[where])
-        # Undiscounted: the design acts through the whole episode, and discounting would fade out late success.
+        # Undiscounted: the design matters at every step of the episode, and discounting would suppress late success.
         returns = tensor(episode_returns(batch.reward, batch.episode_end)[where].astype(np.float32))
         if config.normalize_observations:
             self.value.update_statistics(observation)
+        # The statistics are updated before the prediction: in the first batch, the untrained network, whose output is
+        # near 0, then predicts about the mean return instead of 0.
         self.value.update_returns(returns)
         with torch.no_grad():
             advantage = normalized(returns - self.value.denormalized(observation))
@@ -181,7 +184,7 @@ class SeparateCredit(DesignCredit):
         return {"design_kl": policy.divergence, "design_steps": float(policy.steps), "design_value_loss": value.loss}
 
     def _of_designs(self, observation: Tensor, design: Tensor) -> LogProbs:
-        """Return the log-probabilities of designs (d, D), given their observations (d, O), as a function of rows."""
+        """Return the log-probabilities of designs (d, D) for their observations (d, O) as a function of rows."""
 
         def of_designs(rows: Slots) -> tuple[Tensor, Tensor]:
             index = self.compute.tensor(rows)

@@ -1,10 +1,14 @@
-"""What acts while a batch is collected, for learners of any kind.
+"""The interface for choosing actions while a batch is collected, for any kind of learner.
 
+<<<<<<< HEAD
 Shapes: `S` slots of a batch, `b` slots that take a step at once, `O` observation, `D` design, `C` control, `Z` noise,
 `E` episodes of a slot, `I` instance.
+=======
+Shapes: `S` slots of a batch, `b` slots that step together, `O` observation, `D` design, `C` control, `Z` noise.
+>>>>>>> f0635f779130280050ee4740bab68619d882ff1a
 
-An on-policy learner samples its policy and reports log-probabilities as extras; an off-policy one reports nothing; one
-that tries a population gives every slot its own candidate.
+An on-policy learner samples its policy and stores log-probabilities as extras; an off-policy learner stores none; a
+population-based learner gives every slot its own candidate.
 """
 
 from __future__ import annotations
@@ -18,34 +22,34 @@ from codesign_bench.task import Floats, Singles, Slots
 
 @dataclass(frozen=True)
 class Sample:
-    """Actions for slots that take a step at once, and what the learner wants to remember of how they were chosen."""
+    """Actions for slots that step together, and values that the learner wants to store with them."""
 
     actions: Singles
-    """(b, D) designs or (b, C) controls; what lies outside [-1, 1] is stored as it is and clipped by the episode."""
+    """(b, D) designs or (b, C) controls; values outside [-1, 1] are stored unclipped, and clipped by the episode."""
     extras: Mapping[str, Singles] = field(default_factory=dict)
-    """Name -> (b, ...), stored with the step under the same name."""
+    """Name -> (b, ...), stored with the step under this name."""
 
 
 class Explorer(ABC):
-    """Chooses designs and controls as a function of the observation and of standard-normal noise.
+    """Chooses designs and controls as functions of the observation and of standard-normal noise.
 
-    The collector draws the noise: an action then depends on the random numbers of its own slot and step, not on which
-    other slots are still playing.
+    The collector draws the noise, so that an action depends only on the random numbers of its slot and step, not on
+    which other slots are still running.
     """
 
     def __init__(self, design_noise: int, control_noise: int) -> None:
         self.design_noise = design_noise
-        """Z of a design step: 0 for an explorer that designs without chance."""
+        """Z of a design step; 0 for deterministic designs."""
         self.control_noise = control_noise
         """Z of a control step."""
 
     @abstractmethod
     def sample_design(self, slots: Slots, observation: Singles, noise: Singles) -> Sample:
-        """Return designs for `slots` (b,) of the batch, which see `observation` (b, O), using `noise` (b, Z)."""
+        """Return designs for `slots` (b,) of the batch from `observation` (b, O) and `noise` (b, Z)."""
 
     @abstractmethod
     def sample_control(self, slots: Slots, observation: Singles, noise: Singles) -> Sample:
-        """Return controls for `slots` (b,) of the batch, which see `observation` (b, O), using `noise` (b, Z)."""
+        """Return controls for `slots` (b,) of the batch from `observation` (b, O) and `noise` (b, Z)."""
 
     def instances(self, slots: Slots, episode: Slots) -> Floats | None:
         """Return the instances (b, I) of the episodes numbered `episode` (b,) of their slots; None: draw them."""
@@ -63,7 +67,11 @@ class Trial:
 
 
 class FixedDesigns(Explorer):
+<<<<<<< HEAD
     """Another explorer's controls with designs, and perhaps instances, chosen before the batch."""
+=======
+    """Another explorer's controls with fixed designs, one per slot."""
+>>>>>>> f0635f779130280050ee4740bab68619d882ff1a
 
     def __init__(self, explorer: Explorer, trial: Trial) -> None:
         super().__init__(0, explorer.control_noise)

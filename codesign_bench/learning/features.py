@@ -1,9 +1,9 @@
-"""Take an observation apart for networks.
+"""Split an observation into inputs of networks.
 
-Shapes: `B` batch, `O` observation, `N` nodes of the tool graph, `P` most design parameters of a node.
+Shapes: `B` batch, `O` observation, `N` nodes of the tool graph, `P` largest number of design parameters of a node.
 
-Networks see state, goal, design and phase, but not the elapsed time: with the time limit bootstrapped, the value of a
-state does not depend on it (Pardo et al. 2018).
+The inputs are state, goal, design and phase, but not the elapsed time: with a bootstrapped time limit, the value of a
+state does not depend on the elapsed time (Pardo et al. 2018).
 """
 
 from __future__ import annotations
@@ -26,17 +26,19 @@ class Features(nn.Module):
         self.layout = task.layout
         self.boxes = (task.state_space, task.goal_space)
         self.size = self.layout.goal.stop
-        """Length of state and goal together."""
+        """Total length of state and goal."""
         owners = task.tool_graph.parameter_nodes
         of_node = [[d for d, owner in enumerate(owners) if owner == node] for node in range(task.tool_graph.num_nodes)]
         self.node_width = max(len(parameters) for parameters in of_node)
         """P"""
+        # Nodes may own different numbers of parameters, but their features form one tensor. Missing entries point to
+        # one zero behind the design (see `nodes`), so that a single indexing gathers the parameters of all nodes.
         absent = len(owners)
         padded = [parameters + [absent] * (self.node_width - len(parameters)) for parameters in of_node]
         self.register_buffer("parameter_index", torch.tensor(padded), persistent=False)
         self.node_parameters = of_node
         self.flat_size = self.layout.design.stop + self.PHASES
-        """Length of state, goal, design and phase together."""
+        """Total length of state, goal, design and phase."""
 
     def task(self, observation: Tensor) -> Tensor:
         """Return state and goal of (B, O) observations."""
@@ -48,7 +50,7 @@ class Features(nn.Module):
         return observation[:, start : start + self.PHASES]
 
     def nodes(self, observation: Tensor) -> Tensor:
-        """Return each node's design parameters (N, B, P), padded by zeros, of (B, O) observations."""
+        """Return each node's design parameters (N, B, P), padded with zeros, of (B, O) observations."""
         design = nn.functional.pad(observation[:, self.layout.design], (0, 1))
         return design[:, self.parameter_index].transpose(0, 1)
 

@@ -1,6 +1,6 @@
-"""Generalised advantage estimation (Schulman et al. 2016) with success and the time limit told apart.
+"""Generalised advantage estimation (Schulman et al. 2016) that distinguishes termination from the time limit.
 
-Shapes: `S` slots, `T` steps; a slot's row holds whole episodes one after the other.
+Shapes: `S` slots, `T` steps; a slot's row contains consecutive whole episodes.
 """
 
 from __future__ import annotations
@@ -25,15 +25,18 @@ def generalized_advantages(
     Args:
         reward: (S, T) rewards.
         value: (S, T) value of the state in which each action was taken.
-        next_value: (S, T) value of the state that followed; ignored where `terminated`.
-        terminated: (S, T) the episode ended by success or failure: nothing follows, so nothing is bootstrapped.
-        episode_end: (S, T) the episode's last step for whatever reason: no advantage flows back over it.
-        gamma: discount of a step.
-        gae_lambda: weight of longer estimates.
+        next_value: (S, T) value of the next state; ignored where `terminated`.
+        terminated: (S, T) whether success or failure ended the episode: the return ends, without bootstrapping.
+        episode_end: (S, T) whether the step is its episode's last, for any reason: the sum of errors stops here.
+        gamma: discount factor per step.
+        gae_lambda: weight of longer estimates, lambda.
     """
-    # The sum over k of (gamma lambda)^k error[t + k], taken backwards so that each step uses the sum behind it. Only
-    # `terminated` ends bootstrapping, but every episode's end ends the sum: an episode that was cut off has a future,
-    # which is not the next episode.
+    # The sum over k of (gamma lambda)^k error[t + k], computed backwards so that each step reuses the next step's sum.
+    # Two masks are needed: bootstrapping stops only at `terminated`, but the sum stops at every end of an episode. An
+    # episode that the time limit ended does have a future, but the row continues with another episode.
+    #
+    # The design step, first in its episode and with reward 0, needs no special case: its advantage is
+    # gamma V(first control state) - V(design state) plus the discounted errors of the control steps.
     error = reward + gamma * next_value * ~terminated - value
     advantage = np.zeros_like(error)
     following = np.zeros(error.shape[0])
@@ -44,7 +47,10 @@ def generalized_advantages(
 
 
 def episode_returns(reward: Floats, episode_end: Booleans) -> Floats:
-    """Return the (S, T) undiscounted sums of rewards from each step to the end of its episode."""
+    """Return the (S, T) undiscounted sums of rewards from each step to the end of its episode.
+
+    At the time limit nothing is bootstrapped: the sum is the episode's return.
+    """
     result = np.zeros_like(reward)
     following = np.zeros(reward.shape[0])
     for step in range(reward.shape[1] - 1, -1, -1):

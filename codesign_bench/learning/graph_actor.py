@@ -15,9 +15,9 @@ from codesign_bench.task import Task
 
 
 class GraphDesigner(nn.Module):
-    """Graph network over the tool, then an index MLP: every link puts out its own design parameters.
+    """Graph network over the tool, then an index MLP: every link outputs its own design parameters.
 
-    The links have no properties yet, so every node sees state and goal alone.
+    The links have no properties before the design step, so the only inputs of a node are state and goal.
     """
 
     owner: Tensor
@@ -34,6 +34,8 @@ class GraphDesigner(nn.Module):
         self.graph = GraphNetwork(self.features.size, 0, graph_sizes, task.tool_graph, range(nodes), generator)
         self.index_mlp = IndexMLP(nodes, [graph_sizes[-1], *index_sizes, self.features.node_width], generator)
         owners = task.tool_graph.parameter_nodes
+        # Parameter d is output number `position[d]` of node `owner[d]`: this puts the outputs of all nodes in the order
+        # of the design space. Unused outputs of nodes with fewer parameters are never read and get no gradient.
         places = [self.features.node_parameters[node].index(d) for d, node in enumerate(owners)]
         self.register_buffer("owner", torch.tensor(owners), persistent=False)
         self.register_buffer("position", torch.tensor(places), persistent=False)
@@ -50,7 +52,7 @@ class GraphDesigner(nn.Module):
 
 
 class GraphController(nn.Module):
-    """Graph network over the designed tool, read at the held link, which the robot moves, by its index MLP (ours)."""
+    """Graph network over the designed tool; an index MLP reads it at the held link, which the robot moves (ours)."""
 
     def __init__(
         self, task: Task, graph_sizes: tuple[int, ...], index_sizes: tuple[int, ...], rng: np.random.Generator

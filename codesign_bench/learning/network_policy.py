@@ -1,4 +1,4 @@
-"""Policies made of torch networks.
+"""Policies of torch networks.
 
 Shapes: `B` batch, `O` observation, `A` action.
 """
@@ -20,7 +20,7 @@ Act = Callable[[Tensor], Tensor]
 
 
 class NetworkPolicy(Policy):
-    """Acts by a designer and a controller that are parts of one module, with actions clipped to [-1, 1]."""
+    """A designer and a controller that are parts of one module, with actions clipped to [-1, 1]."""
 
     def __init__(self, network: nn.Module, design: Act, control: Act) -> None:
         self.network = network

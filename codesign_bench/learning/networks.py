@@ -1,7 +1,7 @@
-"""Building blocks: linear layers from a given generator, multilayer perceptrons, index MLP, graph network, normaliser.
+"""Network modules: linear layers with a given generator, MLP, index MLP, graph network, running normalisation.
 
 Shapes: `B` batch, `F` features, `H` hidden units, `N` nodes of the tool graph, `M` nodes that are needed.
-Sources: Transform2Act (Yuan et al. 2022), on which the paper builds, unless a line says "ours".
+Source: Transform2Act (Yuan et al. 2022), on which the paper builds, except where a line says "ours".
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from codesign_bench.task import Box, ToolGraph
 
 
 def torch_generator(rng: np.random.Generator) -> torch.Generator:
-    """Return a torch generator seeded by `rng`, for weights alone; everything later draws from numpy generators."""
+    """Return a torch generator seeded by `rng`, only for initial weights; all else uses numpy generators."""
     return torch.Generator().manual_seed(int(rng.integers(2**62)))
 
 
 def linear(inputs: int, outputs: int, generator: torch.Generator, bias: bool = True) -> nn.Linear:
     """Return a linear layer with torch's usual initial weights, U(+-1/sqrt(inputs)), drawn from `generator`."""
+    # The usual constructor would draw weights from torch's global generator, and shift it for everybody else.
     layer = nn.utils.skip_init(nn.Linear, inputs, outputs, bias=bias)
     bound = inputs**-0.5
     with torch.no_grad():
@@ -33,7 +34,7 @@ def linear(inputs: int, outputs: int, generator: torch.Generator, bias: bool = T
 
 
 class _Tanh(torch.autograd.Function):
-    """tanh(x) = 2 sigmoid(2x) - 1, to 1e-7: on processors without AVX-512 over twice as fast as torch's own."""
+    """tanh(x) = 2 sigmoid(2x) - 1, to 1e-7: more than twice as fast as torch.tanh on processors without AVX-512."""
 
     @staticmethod
     def forward(ctx: Any, x: Tensor) -> Tensor:
@@ -44,7 +45,7 @@ class _Tanh(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> Tensor:
-        """Return the gradient for x: that for y times 1 - y^2."""
+        """Return the gradient with respect to x: that with respect to y times 1 - y^2."""
         (y,) = ctx.saved_tensors
         gradient: Tensor = torch.ops.aten.tanh_backward(gradients[0], y)
         return gradient
@@ -65,7 +66,7 @@ class Tanh(nn.Module):
 
 
 class MLP(nn.Sequential):
-    """Tanh layers and a linear output layer, whose first weights may be scaled down."""
+    """Tanh layers and a linear output layer, whose initial weights may be scaled down."""
 
     def __init__(
         self, sizes: Sequence[int], generator: torch.Generator, output_scale: float = 1.0, activate_last: bool = False
@@ -83,7 +84,7 @@ class MLP(nn.Sequential):
 
 
 class IndexMLP(nn.Module):
-    """Tanh layers whose weights differ per node; the last layer is linear, scaled by 0.1, with bias 0.
+    """Tanh layers with separate weights per node; the last layer is linear, initially scaled by 0.1 and with bias 0.
 
     (M, B, F) node features -> (M, B, outputs).
     """
@@ -99,6 +100,7 @@ class IndexMLP(nn.Module):
             self.weights.append(torch.empty(num_nodes, inputs, outputs).uniform_(-bound, bound, generator=generator))
             self.biases.append(torch.empty(num_nodes, 1, outputs).uniform_(-bound, bound, generator=generator))
         with torch.no_grad():
+            # Small first outputs: means start close to the centre of [-1, 1], where actions are not clipped.
             self.weights[-1].mul_(self.OUTPUT_SCALE)
             self.biases[-1].zero_()
 
@@ -106,7 +108,7 @@ class IndexMLP(nn.Module):
         """Map (M, B, F) to (M, B, outputs)."""
         last = len(self.weights) - 1
         for index, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            # One node is an ordinary layer, for which the plain product is several times as fast as the batched one.
+            # With one node this is an ordinary layer; the plain product is several times as fast as the batched one.
             x = torch.baddbmm(bias, x, weight) if len(weight) > 1 else torch.addmm(bias[0], x[0], weight[0])[None]
             if index < last:
                 x = tanh(x)
@@ -116,7 +118,7 @@ class IndexMLP(nn.Module):
 class GraphConvolution(nn.Module):
     """x_i W_own + (sum over neighbours j of x_j) W_neighbours + b, for the nodes that the next layer needs.
 
-    Equal to torch-geometric's `GraphConv` with sum aggregation, on one dense adjacency matrix for the whole batch.
+    Equal to torch-geometric's `GraphConv` with sum aggregation, with one dense adjacency matrix for the whole batch.
     """
 
     adjacency: Tensor
@@ -133,24 +135,25 @@ class GraphConvolution(nn.Module):
         self._keeps_all = list(kept) == list(range(adjacency.shape[1]))
 
     def forward(self, x: Tensor) -> Tensor:
-        """Map (N, B, F) features of this layer's nodes to (M, B, H) features of the nodes that are kept."""
+        """Map features (N, B, F) of this layer's nodes to features (M, B, H) of the kept nodes."""
+        # All nodes share the weights, so nodes and batch are flattened into one large product per matrix.
         own, summed = self.gather(x)
         result = torch.addmm(self.neighbours.bias, summed.flatten(0, 1), self.neighbours.weight.t())
         result = torch.addmm(result, own.flatten(0, 1), self.own.weight.t())
         return result.view(*own.shape[:2], -1)
 
     def gather(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the kept nodes' own features and the sums of their neighbours', each (M, B, F), of x (N, B, F)."""
+        """Return the kept nodes' features and the sums over their neighbours, each (M, B, F), of x (N, B, F)."""
         nodes, batch, features = x.shape
         summed = (self.adjacency @ x.reshape(nodes, batch * features)).view(-1, batch, features)
         return x if self._keeps_all else x[self.kept], summed
 
 
 class GraphNetwork(nn.Module):
-    """Linear in, then graph convolutions with ReLU, over one fixed tool graph, read at some of its nodes.
+    """A linear input layer and graph convolutions with ReLU on one fixed tool graph, read at some of its nodes.
 
-    Every node sees the features that the whole task shares, (B, F), and its own, (N, B, P) or none. A layer computes
-    only the nodes that still reach a node that is read, which changes no number (ours).
+    The inputs of a node are features that all nodes share, (B, F), and its own, (N, B, P) or none. A layer computes
+    only the nodes that can still influence a node that is read; the outputs are the same (ours).
     """
 
     def __init__(
@@ -167,6 +170,8 @@ class GraphNetwork(nn.Module):
         self.shared = linear(shared, hidden[0], generator)
         self.own = linear(own, hidden[0], generator, bias=False) if own else None
         adjacency = adjacency_matrix(graph)
+        # Backwards from the output: to compute a node, a layer needs this node and its neighbours from the layer
+        # before. With the held link as the only output, the last layer computes one node instead of all.
         needed = [sorted(read)]
         for _ in hidden:
             needed.append(sorted({*needed[-1], *(int(j) for i in needed[-1] for j in adjacency[i].nonzero()[:, 0])}))
@@ -181,7 +186,7 @@ class GraphNetwork(nn.Module):
             self.layers.append(GraphConvolution(sizes[index], sizes[index + 1], block, kept, generator))
 
     def forward(self, shared: Tensor, own: Tensor | None = None) -> Tensor:
-        """Map shared (B, F) and own (N, B, P) features to (M, B, H) features of the nodes read, in ascending order."""
+        """Map shared (B, F) and own (N, B, P) features to features (M, B, H) of the read nodes, in ascending order."""
         x = torch.relu(self._first(shared, own))
         for layer in list(self.layers)[1:]:
             x = torch.relu(layer(x))
@@ -190,21 +195,22 @@ class GraphNetwork(nn.Module):
     def _first(self, shared: Tensor, own: Tensor | None) -> Tensor:
         """Return the first convolution's (M, B, H) output, before its ReLU.
 
-        Nothing lies between the linear layer in and the first convolution, so what the nodes share is multiplied once
-        for all of them, and their own features by one product of the two layers' weights.
+        There is no nonlinearity between the input layer and the first convolution. So the shared features are
+        multiplied once for all nodes, and the nodes' own features by one product of the two layers' weights.
         """
-        layer: GraphConvolution = self.layers[0]  # type: ignore[assignment]  # ModuleList forgets the class.
-        # Node i enters the convolution as h + g_i: h is the linear layer's output for what all nodes share, g_i the one
-        # for its own features. With d_i neighbours it leaves as
+        layer: GraphConvolution = self.layers[0]  # type: ignore[assignment]  # ModuleList is not typed by its items
+        # The convolution's input at node i is h + g_i: the input layer maps the shared features to h and the node's own
+        # features to g_i. With d_i neighbours the output is
         #     h W_own + d_i h W_neighbours + b  +  g_i W_own + (sum over neighbours j of g_j) W_neighbours,
-        # where h W_own and h W_neighbours are the same for all nodes: two products instead of two for each node.
+        # where h W_own and h W_neighbours are the same for all nodes: two products in total instead of two per node.
         hidden = self.shared(shared)
         once = nn.functional.linear(hidden, layer.own.weight, layer.neighbours.bias)
         per_neighbour = nn.functional.linear(hidden, layer.neighbours.weight)
         x = torch.addcmul(once, layer.adjacency.sum(1)[:, None, None], per_neighbour)
         if self.own is None or own is None:
             return x
-        # g_i is linear in the few features of the node itself: its two layers are multiplied first, once for all rows.
+        # g_i is linear in the node's few features, so the weights of the two layers are multiplied first, once for all
+        # rows. The product of weights is small; the product of rows with the hidden width would not be.
         own = own[self.inputs] if len(self.inputs) < self.num_nodes else own
         weight = torch.cat([layer.own.weight @ self.own.weight, layer.neighbours.weight @ self.own.weight], dim=1)
         features = torch.cat(layer.gather(own), dim=-1).flatten(0, 1)
@@ -212,7 +218,7 @@ class GraphNetwork(nn.Module):
 
 
 def adjacency_matrix(graph: ToolGraph) -> Tensor:
-    """Return the symmetric (N, N) adjacency matrix of a tool graph, without self-loops."""
+    """Return the symmetric adjacency matrix (N, N) of a tool graph, without self-loops."""
     matrix = torch.zeros(graph.num_nodes, graph.num_nodes)
     for i, j in graph.edges:
         matrix[i, j] = matrix[j, i] = 1.0
@@ -222,8 +228,8 @@ def adjacency_matrix(graph: ToolGraph) -> Tensor:
 class RunningNorm(nn.Module):
     """Normalises features by their running mean and standard deviation, clipped to +-5.
 
-    Until the first update it maps the middle and the half width of the features' bounds to 0 and 2 (ours), so that the
-    first rollout, too, sees values of order one.
+    Before the first update, it maps the bounds of each feature to +-2 (ours), so that inputs are of order one in the
+    first rollout as well.
     """
 
     CLIP = 5.0
@@ -240,16 +246,20 @@ class RunningNorm(nn.Module):
 
     @classmethod
     def over(cls, *boxes: Box) -> RunningNorm:
-        """Return a normaliser for the entries of `boxes`, one after the other."""
+        """Return a normaliser for the entries of `boxes`, concatenated."""
         return cls([v for box in boxes for v in box.low], [v for box in boxes for v in box.high])
 
     def update(self, values: Tensor) -> None:
-        """Take (B, F) values into the running mean and variance (Chan et al. 1979)."""
+        """Update the running mean and variance with values (B, F) (Chan et al. 1979)."""
+        # Merging two sets: the variances within each, weighted by size, plus the spread between their means. Unlike a
+        # sum of squares this does not cancel when the mean is large, and double precision keeps small batches from
+        # being lost against a large count.
         values = values.double()
         count = values.shape[0]
         total = self.count + count
         difference = values.mean(0) - self.mean
         weight = count / total
+        # The initial mean and variance come from bounds, not data: the first batch replaces them instead of mixing.
         old = torch.where(self.count > 0, self.variance * (self.count / total), torch.zeros_like(self.variance))
         cross = torch.where(self.count > 0, difference**2 * weight * (1 - weight), torch.zeros_like(self.variance))
         self.variance.copy_(old + values.var(0, unbiased=False) * weight + cross)
@@ -258,5 +268,7 @@ class RunningNorm(nn.Module):
 
     def forward(self, values: Tensor) -> Tensor:
         """Normalise (B, F) values."""
+        # A feature that has been constant so far has no variance; the first value that differs is clipped instead of
+        # dominating the layer.
         scale = (self.variance + 1e-8).rsqrt().float()
         return ((values - self.mean.float()) * scale).clamp(-self.CLIP, self.CLIP)

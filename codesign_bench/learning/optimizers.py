@@ -1,4 +1,4 @@
-"""Optimizers of PPO-based learners and the schedule of their step sizes."""
+"""Optimizers of PPO-based learners and their learning rate schedule."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from codesign_bench.learning.checkpointing import Optimizers
 
 
 def adam(parameters: Iterable[nn.Parameter], learning_rate: float) -> torch.optim.Adam:
-    """Return Adam (Kingma and Ba 2015) for those of `parameters` that are learned."""
+    """Return Adam (Kingma and Ba 2015) for the trainable ones of `parameters`."""
     return torch.optim.Adam([p for p in parameters if p.requires_grad], lr=learning_rate, fused=True)
 
 
 class Annealing:
-    """Step sizes that fall linearly over the budget, from what they are now to a fraction of that."""
+    """Learning rates that decrease linearly over the budget to a fraction of their initial values."""
 
     def __init__(self, optimizers: Optimizers, final_fraction: float) -> None:
         self.optimizers, self.final_fraction = optimizers, final_fraction
         self._start = {name: optimizer.param_groups[0]["lr"] for name, optimizer in optimizers.items()}
 
     def set(self, done: float) -> None:
-        """Set the step sizes for the time when the fraction `done` of the budget is used up."""
+        """Set the learning rates for the time when the fraction `done` of the budget is used."""
         factor = 1.0 - done * (1.0 - self.final_fraction)
         for name, optimizer in self.optimizers.items():
             optimizer.param_groups[0]["lr"] = self._start[name] * factor

@@ -1,7 +1,7 @@
-"""Proximal policy optimisation (Schulman et al. 2017): one clipped update of a policy and of a value network.
+"""Proximal policy optimisation (Schulman et al. 2017): the clipped update of a policy, and that of a value network.
 
-Shapes: `n` rows of a batch, `O` observation. The update knows nothing of phases: a policy is a function from row
-indices to log-probabilities and entropy.
+Shapes: `n` rows of a batch, `m` rows of a minibatch, `O` observation, `A` action. The update does not depend on phases:
+a policy is a function from row indices to log-probabilities and entropy.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ LogProbs = Callable[[Slots], tuple[Tensor, Tensor]]
 
 @dataclass(frozen=True)
 class PolicyLoss:
-    """The clipped surrogate objective with its limits."""
+    """The clipped surrogate objective and its limits."""
 
     clip_ratio: float
     entropy_weight: float
     kl_threshold: float
-    """The policy's update ends when a minibatch's estimated KL divergence from the old policy exceeds this."""
+    """The policy update stops when a minibatch's estimated KL divergence from the old policy exceeds this."""
     max_gradient_norm: float
 
     @classmethod
     def of(cls, config: PPOConfig, kl_threshold: float) -> PolicyLoss:
-        """Return the loss that `config` describes, with this limit of the divergence."""
+        """Return the loss of `config` with this limit on the KL divergence."""
         return cls(config.clip_ratio, config.entropy_weight, kl_threshold, config.max_gradient_norm)
 
     def __call__(
@@ -42,11 +42,11 @@ class PolicyLoss:
         """Return loss () and the estimated KL divergence (Schulman's k3 estimator) for (m,) inputs."""
         log_ratio = log_prob - old_log_prob
         ratio = log_ratio.exp()
-        # The smaller of the two takes away what could be gained beyond the range, but keeps what is lost there: a step
-        # that went too far in the wrong direction is still corrected.
+        # The minimum removes any gain beyond the clipping range but keeps the loss there: a step that went too far in
+        # the wrong direction is still corrected.
         clipped = ratio.clamp(1.0 - self.clip_ratio, 1.0 + self.clip_ratio)
         surrogate = torch.minimum(ratio * advantage, clipped * advantage).mean()
-        with torch.no_grad():  # Unbiased like -log_ratio, but never negative, which makes it steadier on few rows.
+        with torch.no_grad():  # unbiased like -log_ratio, but never negative: less variance on few rows
             divergence = float((ratio - 1.0 - log_ratio).mean())
         return -surrogate - self.entropy_weight * entropy, divergence
 
@@ -59,7 +59,7 @@ class Update(Protocol):
 
 
 class PolicyUpdate:
-    """One batch's policy update; stops for good once its KL divergence is too large."""
+    """One batch's policy update; stops permanently once the KL divergence is too large."""
 
     def __init__(
         self,
@@ -83,8 +83,8 @@ class PolicyUpdate:
         index = torch.from_numpy(rows).to(self.advantage.device)
         log_prob, entropy = self.log_probs(rows)
         loss, self.divergence = self.loss(log_prob, self.old_log_prob[index], self.advantage[index], entropy)
-        # Checked before the step, so the one that would go further is not taken. Advantages belong to the policy that
-        # collected the batch and say little of one so far from it, so the rest of the batch is not used either.
+        # Checked before the step, so that a step that would go further is not taken. Advantages were estimated for the
+        # policy that collected the batch and are unreliable this far from it, so the rest of the batch is not used.
         if self.divergence > self.loss.kl_threshold:
             self.stopped = True
             return
@@ -93,7 +93,7 @@ class PolicyUpdate:
 
 
 class ValueUpdate:
-    """One batch's regression of a value network, `predict`, on its targets by mean squared error."""
+    """One batch's value update: regression of `predict` on the targets by mean squared error."""
 
     def __init__(
         self,
@@ -119,7 +119,7 @@ class ValueUpdate:
 def gradient_step(
     loss: Tensor, optimizer: torch.optim.Optimizer, parameters: list[nn.Parameter], max_norm: float
 ) -> None:
-    """Take one step on `loss` with the gradient's norm clipped."""
+    """Take one step on `loss` with a clipped gradient norm."""
     optimizer.zero_grad(set_to_none=True)
     loss.backward()
     nn.utils.clip_grad_norm_([p for p in parameters if p.grad is not None], max_norm)
@@ -127,12 +127,14 @@ def gradient_step(
 
 
 def minibatches(count: int, size: int, rng: np.random.Generator) -> Iterator[Slots]:
-    """Yield a random partition of `count` rows into near-equal parts of about `size` rows."""
+    """Yield a random partition of `count` rows into near-equal minibatches of about `size` rows."""
+    # Near-equal parts: a fixed size would leave a remainder, possibly of one row, whose gradient is mostly noise but
+    # moves Adam as far as any other.
     yield from np.array_split(rng.permutation(count), max(1, round(count / size)))
 
 
 def normalized(values: Tensor) -> Tensor:
-    """Return (n,) values with mean 0 and standard deviation 1; only the mean is removed when all are alike."""
+    """Return (n,) values with mean 0 and standard deviation 1; all zero if the values are equal."""
     spread = values.std(unbiased=False)
     return (values - values.mean()) / (spread + 1e-8)
 

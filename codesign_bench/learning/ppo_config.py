@@ -1,4 +1,4 @@
-"""Hyperparameters of the PPO-based methods: PPO's own, and those of graph networks and of multilayer perceptrons."""
+"""Hyperparameters of the PPO-based methods: of PPO, of graph networks and of multilayer perceptrons."""
 
 from __future__ import annotations
 
@@ -17,58 +17,58 @@ OURS = {"source": "ours"}
 
 @dataclass(frozen=True, kw_only=True)
 class PPOConfig:
-    """Hyperparameters that every PPO-based method has. Their defaults are total: any task runs with them."""
+    """Hyperparameters of every PPO-based method. All have defaults, and any task runs with the defaults."""
 
     batch_size: int = 10_000
-    """Environment steps of a batch; episodes are finished."""
+    """Environment steps per batch; episodes are finished."""
     minibatch_size: int = 500
-    """Steps of a minibatch."""
+    """Environment steps per minibatch."""
     epochs: int = 4
     """Passes over a batch (the paper's "PPO steps per batch")."""
     policy_learning_rate: float = 7e-4
-    """Adam's step size for designer and controller."""
+    """Adam's learning rate for designer and controller."""
     value_learning_rate: float = 7e-4
-    """Adam's step size for the value networks."""
+    """Adam's learning rate for the value networks."""
     final_learning_rate_fraction: float = field(default=1.0, metadata=OURS)
-    """Step sizes fall linearly to this fraction of their start over the budget."""
+    """Learning rates decrease linearly over the budget to this fraction of their initial values."""
     entropy_weight: float = 0.0
-    """Weight of the entropy bonus; without effect on fixed standard deviations."""
+    """Weight of the entropy bonus; no effect with fixed standard deviations."""
     kl_threshold: float = 0.05
-    """A batch's policy update ends at this estimated KL divergence."""
+    """A batch's policy update stops at this estimated KL divergence."""
     control_log_std: float = -0.5
     """(Initial) log standard deviation of controls in [-1, 1]."""
     design_log_std: float = -1.0
     """(Initial) log standard deviation of designs in [-1, 1]."""
     fix_std: bool = True
-    """Whether the standard deviations stay as they are."""
+    """Whether the standard deviations are fixed instead of learned."""
     gamma: float = field(default=0.995, metadata=TRANSFORM2ACT)
-    """Discount of a step."""
+    """Discount factor per step."""
     gae_lambda: float = field(default=0.95, metadata=TRANSFORM2ACT)
-    """Weight of longer advantage estimates."""
+    """Lambda of generalised advantage estimation."""
     clip_ratio: float = field(default=0.2, metadata=TRANSFORM2ACT)
     """Clipping range of the probability ratio."""
     max_gradient_norm: float = field(default=40.0, metadata=TRANSFORM2ACT)
-    """Gradients are clipped to this norm."""
+    """Largest gradient norm; larger gradients are scaled down."""
     bootstrap_time_limit: bool = field(default=True, metadata=OURS)
-    """Whether the time limit is bootstrapped by the value of the state reached; False treats it as an end in itself."""
+    """Whether the value of the final state is bootstrapped at the time limit; False treats the limit as termination."""
     normalize_observations: bool = field(default=True, metadata={"source": "Transform2Act's; the paper is silent"})
-    """Whether state and goal are normalised by their running mean and deviation; False: by their bounds."""
+    """Whether state and goal are normalised by their running mean and standard deviation; False: by their bounds."""
     normalize_returns: bool = field(default=True, metadata=OURS)
-    """Whether the value network learns returns normalised by their running mean and deviation."""
+    """Whether the value network learns returns normalised by their running mean and standard deviation."""
     design_credit: Credit = "separate"
-    """`joint` (the paper's) or `separate` (ours)."""
+    """Credit of the design step: `joint` (the paper's) or `separate` (ours)."""
     design_learning_rate: float = 7e-4
-    """Adam's step size for the designer under separate credit."""
+    """Adam's learning rate for the designer under separate credit."""
     design_epochs: int = field(default=10, metadata=OURS)
     """Passes over a batch's design steps under separate credit."""
     design_minibatch_size: int = field(default=1_000, metadata=OURS)
-    """Design steps of a minibatch under separate credit."""
+    """Design steps per minibatch under separate credit."""
     design_kl_threshold: float = field(default=0.05, metadata=OURS)
-    """The design update's own KL stop under separate credit."""
+    """Under separate credit, the design update stops at this estimated KL divergence."""
     precision: Precision = field(default="fp32", metadata=OURS)
-    """`fp32`, or `bf16` for the products of an update: several times as fast on processors that compute in bfloat16."""
+    """`fp32`, or `bf16` for matrix products in updates: several times as fast on processors with bfloat16 units."""
     num_slots: int | None = field(default=None, metadata=OURS)
-    """Episodes rolled out at once; None: as many as fill a batch with one full-length episode each."""
+    """Number of parallel episodes; None: as many as fill a batch with one full-length episode each."""
 
     def __post_init__(self) -> None:
         check_choices(self)
@@ -92,7 +92,7 @@ class GraphConfig(PPOConfig):
     design_index_mlp: tuple[int, ...] = (64, 64)
     """Widths of the designer's index MLP."""
     value_mlp: tuple[int, ...] = (128,)
-    """Widths of the tanh layers behind the value network's graph network."""
+    """Widths of the tanh layers after the value network's graph network."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

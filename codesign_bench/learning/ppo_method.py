@@ -1,4 +1,4 @@
-"""A method that is a two-phase PPO learner; its subclasses say which networks it has."""
+"""Base class of methods with a two-phase PPO learner; subclasses define the networks."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ConfigType = TypeVar("ConfigType", bound=PPOConfig)
 
 
 class PPOMethod(Method[ConfigType]):
-    """Everything of a PPO-based method but its networks."""
+    """A PPO-based method without its networks."""
 
     config_class: ClassVar[type] = PPOConfig
 
@@ -34,12 +34,12 @@ class PPOMethod(Method[ConfigType]):
     @classmethod
     @abstractmethod
     def make_actor(cls, task: Task, config: ConfigType, rng: np.random.Generator) -> Actor:
-        """Return a fresh designer and controller with weights from `rng`."""
+        """Return a new designer and controller with weights from `rng`."""
 
     @classmethod
     @abstractmethod
     def make_value(cls, task: Task, config: ConfigType, rng: np.random.Generator) -> ValueNetwork:
-        """Return a fresh value network with weights from `rng`."""
+        """Return a new value network with weights from `rng`."""
 
     def use_cores(self, count: int) -> None:
         """Use up to `count` cores."""
@@ -50,11 +50,11 @@ class PPOMethod(Method[ConfigType]):
         self.learner.use_device(name)
 
     def start_from(self, tensors: Mapping[str, Any]) -> None:
-        """Take over a trained designer and controller; the value networks start afresh."""
+        """Start from a trained designer and controller with new value networks."""
         load_module_arrays(self.learner.actor, tensors)
 
     def train(self, remaining_steps: int) -> BatchReport:
-        """Collect one batch of whole episodes and improve all networks on it."""
+        """Collect one batch of whole episodes and update all networks on it."""
         return self.learner.train(remaining_steps)[0]
 
     def policy(self) -> Policy:
@@ -63,7 +63,7 @@ class PPOMethod(Method[ConfigType]):
 
     @classmethod
     def make_policy(cls, task: Task, config: ConfigType, tensors: Mapping[str, Any]) -> Policy:
-        """Return the actor with the given parameters, acting with its means."""
+        """Return the policy of an actor with the given parameters."""
         actor = cls.make_actor(task, config, np.random.default_rng(0))
         load_module_arrays(actor, tensors)
         return ActorPolicy(actor)
@@ -73,5 +73,5 @@ class PPOMethod(Method[ConfigType]):
         return self.learner.state()
 
     def load_state(self, state: State) -> None:
-        """Put the learner's state back."""
+        """Restore the learner's state."""
         self.learner.load_state(state)

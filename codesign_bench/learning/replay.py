@@ -1,4 +1,4 @@
-"""Transitions of two-phase episodes, and a buffer of the latest of them for off-policy learners.
+"""Transitions of two-phase episodes, and a replay buffer of them for off-policy learners.
 
 Shapes: `n` transitions, `O` observation, `D` design, `C` control.
 """
@@ -17,7 +17,7 @@ from codesign_bench.task import Booleans, Singles, Slots, Task
 
 @dataclass(frozen=True)
 class Transitions:
-    """Single steps, in any order: the design step is one like the others, whose action is a design."""
+    """Single steps in any order; a design step is a transition whose action is a design."""
 
     observation: Singles
     """(n, O)"""
@@ -32,7 +32,7 @@ class Transitions:
     next_observation: Singles
     """(n, O) arbitrary where `terminated`."""
     terminated: Booleans
-    """(n,) whether success or failure ended the episode; the time limit does not count."""
+    """(n,) whether success or failure ended the episode; False at the time limit."""
 
     @classmethod
     def of(cls, batch: Trajectories) -> Transitions:
@@ -42,7 +42,7 @@ class Transitions:
 
     @classmethod
     def empty(cls, count: int, task: Task) -> Transitions:
-        """Return room for `count` transitions of `task`."""
+        """Return zero-filled storage for `count` transitions of `task`."""
 
         def singles(*size: int) -> Singles:
             return np.zeros((count, *size), dtype=np.float32)
@@ -67,7 +67,7 @@ class Transitions:
 
 
 class ReplayBuffer:
-    """The latest transitions; new ones overwrite the oldest."""
+    """The most recent transitions; new ones overwrite the oldest."""
 
     def __init__(self, capacity: int, task: Task) -> None:
         self.added = 0
@@ -78,23 +78,23 @@ class ReplayBuffer:
         return min(self.added, len(self._store))
 
     def add(self, new: Transitions) -> None:
-        """Add transitions, in their order."""
+        """Add transitions in order."""
         rows = (self.added + np.arange(len(new))) % len(self._store)
-        latest = slice(max(0, len(new) - len(self._store)), None)  # The rest would overwrite itself.
+        latest = slice(max(0, len(new) - len(self._store)), None)  # earlier ones would be overwritten at once
         for name, array in vars(self._store).items():
             array[rows[latest]] = getattr(new, name)[latest]
         self.added += len(new)
 
     def sample(self, count: int, rng: np.random.Generator) -> Transitions:
-        """Return `count` transitions, drawn with replacement, all with the same probability."""
+        """Return `count` transitions, drawn uniformly with replacement."""
         return self._store.rows(rng.integers(len(self), size=count))
 
     def arrays(self) -> dict[str, Array]:
-        """Return what `load` takes back, for `State.large`: no copies."""
+        """Return the arrays for `load`, without copies, as `State.large` allows."""
         return {**vars(self._store.rows(slice(len(self)))), "added": np.array(self.added)}
 
     def load(self, arrays: Mapping[str, Array]) -> None:
-        """Restore what `arrays` returned."""
+        """Restore the arrays that `arrays` returned."""
         self.added = int(arrays["added"])
         for name, array in vars(self._store).items():
             array[: len(self)] = arrays[name]

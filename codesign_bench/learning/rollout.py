@@ -1,10 +1,10 @@
-"""Collect whole episodes from many slots at once.
+"""Collect whole episodes from many slots in parallel.
 
-Shapes: `S` slots, `b` slots that a call names, `T` steps, `C` control, `Z` noise of a control step.
+Shapes: `S` slots, `b` slots of a call, `T` steps, `C` control, `Z` noise of a control step.
 
-A batch holds whole episodes only: every slot plays episodes until it has taken its share of the steps. So the design
-step's return is known, nothing of a simulator has to be saved between batches, and no value is needed to cut an
-episode.
+A batch contains only whole episodes: every slot plays episodes until it has taken its share of the steps. So the return
+of the design step is known, no simulator state is saved between batches, and no episode is cut and bootstrapped at the
+end of a batch.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from codesign_bench.task.episodes import Episodes
 
 
 class Collector:
-    """Plays episodes of a problem, in the simulator that the problem lends."""
+    """Plays episodes of a problem in the problem's shared simulator."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -34,7 +34,7 @@ class Collector:
             steps: environment steps wanted; the last episode of every slot is finished.
             num_slots: slots to use.
             rng: source of instances and of all noise.
-            first_slot: the number by which the explorer knows the first of these slots.
+            first_slot: the index of the first of these slots in the batch, as the explorer counts.
         """
         with self.problem.episodes(num_slots) as episodes:
             rollout = _Rollout(self.problem, episodes, explorer, max(1, steps // num_slots), num_slots, rng, first_slot)
@@ -42,7 +42,7 @@ class Collector:
 
 
 class _Rollout:
-    """One group of slots on its way through a batch."""
+    """The rollout of one group of slots."""
 
     def __init__(
         self,
@@ -54,17 +54,22 @@ class _Rollout:
         rng: np.random.Generator,
         first_slot: int,
     ) -> None:
+        # A slot may begin its last episode one step before its share is reached, and finishes it.
         task, capacity = problem.task, share + problem.task.horizon + 1
         sizes = task.layout.size, task.control_space.size, task.design_space.size
         self.problem, self.episodes, self.explorer, self.rng = problem, episodes, explorer, rng
         self.share, self.first_slot = share, first_slot
         self.data = Trajectories.empty(num_slots, capacity, *sizes)
-        # All at once: a draw per step would cost more, and its numbers would depend on which slots still play.
+        # One draw for all steps: a draw per step would be slower and would depend on which slots are active.
         self.control_noise = rng.standard_normal((num_slots, capacity, explorer.control_noise), dtype=np.float32)
         self.time = np.zeros(num_slots, dtype=np.intp)
+<<<<<<< HEAD
         """(S,) steps that each slot has taken."""
         self.episode = np.zeros(num_slots, dtype=np.intp)
         """(S,) episodes that each slot has begun."""
+=======
+        """(S,) number of steps that each slot has taken."""
+>>>>>>> f0635f779130280050ee4740bab68619d882ff1a
 
     def play(self) -> Trajectories:
         """Play until every slot has taken its share of the steps."""

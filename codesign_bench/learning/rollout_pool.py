@@ -1,4 +1,4 @@
-"""Play the groups of a batch in separate processes; the numbers are those of playing them one after the other.
+"""Play the groups of a batch in separate processes, with the same results as one group after the other.
 
 Shapes: `S` slots of a group.
 """
@@ -27,23 +27,23 @@ _collector: Collector | None = None
 
 @dataclass(frozen=True)
 class Group:
-    """What one group of slots plays."""
+    """One group of slots of a batch."""
 
     steps: int
-    """Environment steps of all its slots together."""
+    """Total environment steps of its slots."""
     slots: int
     """S"""
     rng: np.random.Generator
     first_slot: int = 0
-    """The number of its first slot in the batch."""
+    """The index of its first slot in the batch."""
 
     def collect(self, collector: Collector, explorer: Explorer) -> Trajectories:
-        """Play the group with `collector`; its generator moves on."""
+        """Play the group with `collector`; this advances the generator."""
         return collector.collect(explorer, self.steps, self.slots, self.rng, self.first_slot)
 
 
 class RolloutPool:
-    """Worker processes, each with its own simulator, started when first needed; they end with this process."""
+    """Worker processes with one simulator each, started on first use; they end with this process."""
 
     def __init__(self, problem: Problem, workers: int) -> None:
         self._pool = ProcessPoolExecutor(
@@ -54,16 +54,17 @@ class RolloutPool:
         )
 
     def collect(self, explorer: Explorer, groups: Sequence[Group]) -> list[Trajectories]:
-        """Play `groups`; their generators move on as if they had been played here."""
+        """Play `groups`; their generators advance as if the groups had been played in this process."""
         results = list(self._pool.map(_play, [explorer] * len(groups), groups))
+        # A worker advances its copy of the generator; without this the next batch would repeat the same random numbers.
         for group, (_, rng) in zip(groups, results, strict=True):
             group.rng.bit_generator.state = rng.bit_generator.state
         return [batch for batch, _ in results]
 
 
 def _prepare(problem: Problem, parent: int) -> None:
-    global _collector  # a worker process has one
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides.
+    global _collector  # one per worker process
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; the parent handles it
     end_with(parent)
     torch.set_num_threads(1)
     _collector = Collector(problem)

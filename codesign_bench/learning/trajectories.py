@@ -1,4 +1,4 @@
-"""Batches of whole episodes, whoever collected them and whatever is learned from them.
+"""Batches of whole episodes, for any collector and any learner.
 
 Shapes: `S` slots, `T` steps, `n` valid steps, `O` observation, `D` design, `C` control.
 """
@@ -16,10 +16,10 @@ from codesign_bench.task import Booleans, Floats, Singles
 
 @dataclass(frozen=True)
 class Trajectories:
-    """Steps of whole episodes, one episode after another in each slot; rows beyond a slot's last are not `valid`."""
+    """Steps of whole episodes, consecutive within each slot; rows after a slot's last step are not `valid`."""
 
     observation: Singles
-    """(S, T, O) what the explorer saw."""
+    """(S, T, O) observations of the explorer."""
     control: Singles
     """(S, T, C) sampled controls, before clipping; zero at design steps."""
     design: Singles
@@ -39,13 +39,13 @@ class Trajectories:
     final_observation: Singles
     """(S, T, O) the state after a truncated step; zero elsewhere."""
     extras: dict[str, Singles] = field(default_factory=dict)
-    """Name -> (S, T, ...) what the explorer said of its actions; zero at steps of which it said nothing."""
+    """Name -> (S, T, ...) values that the explorer stored with its actions; zero at steps without a value."""
     reward_terms: dict[str, float] = field(default_factory=dict)
-    """Name -> sum over all steps of what the task or the trade-off names as a part of the reward."""
+    """Name -> sum over all steps of a reward term of the task or the trade-off."""
 
     @classmethod
     def empty(cls, slots: int, steps: int, observation: int, control: int, design: int) -> Trajectories:
-        """Return room for `slots` x `steps` steps with the given sizes of observations and actions."""
+        """Return zero-filled storage for `slots` x `steps` steps with the given sizes of observations and actions."""
 
         def singles(size: int) -> Singles:
             return np.zeros((slots, steps, size), dtype=np.float32)
@@ -68,12 +68,12 @@ class Trajectories:
 
     @property
     def env_steps(self) -> int:
-        """Number of environment steps, design steps included."""
+        """Number of environment steps, including design steps."""
         return int(self.valid.sum())
 
     @property
     def episode_end(self) -> Booleans:
-        """(S, T) last steps of episodes."""
+        """(S, T) whether a step is the last of its episode."""
         return self.terminated | self.truncated
 
     @property
@@ -84,7 +84,7 @@ class Trajectories:
 
     @property
     def next_observation(self) -> Singles:
-        """(S, T, O) the state after each step, for learners from single transitions; arbitrary after termination."""
+        """(S, T, O) the observation after each step, for learners on transitions; arbitrary after termination."""
         result = self.final_observation.copy()
         going = ~self.episode_end[:, :-1]
         result[:, :-1][going] = self.observation[:, 1:][going]
@@ -102,7 +102,7 @@ class Trajectories:
 
 
 def joined(groups: Sequence[Trajectories]) -> Trajectories:
-    """Return the slots of all groups, one group after the other, as one batch."""
+    """Concatenate the slots of all groups into one batch."""
     if len(groups) == 1:
         return groups[0]
     length = max(group.valid.shape[1] for group in groups)
@@ -124,7 +124,7 @@ def _is_array(value: object) -> bool:
 
 
 def _padded(values: np.ndarray, length: int) -> np.ndarray:
-    """Return (S, T, ...) `values` with rows of zeros up to `length` steps."""
+    """Return (S, T, ...) `values` padded with zeros to `length` steps."""
     missing = [(0, 0)] * values.ndim
     missing[1] = (0, length - values.shape[1])
     return np.pad(values, missing)

@@ -2,8 +2,8 @@
 
 Shapes: `S` slots, `n` valid steps of a batch, `b` slots, `D` design.
 
-The learner holds the parts together: `BatchCollector` plays episodes, `Critic` judges their steps, `DesignCredit` says
-how the design step is learned, `UpdateLoop` takes the gradient steps, `Compute` knows device and precision.
+The learner connects its parts: `BatchCollector` plays episodes, `Critic` estimates advantages, `DesignCredit` defines
+how the design step is learned, `UpdateLoop` takes the gradient steps, `Compute` holds device and precision.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ ChooseTrial = Callable[[int, int], Trial]
 
 
 class TwoPhaseLearner:
-    """Collects batches with an actor and improves it by PPO; methods differ in the networks that they hand in."""
+    """Collects batches with an actor and trains it by PPO; methods differ in the networks that they pass in."""
 
     def __init__(
         self,
@@ -72,12 +72,12 @@ class TwoPhaseLearner:
         return SeparateCredit(task, self.config, self.streams, self.actor, self.compute, self.loop)
 
     def use_cores(self, count: int) -> None:
-        """Use up to `count` cores: rollouts in processes, policy and value update in threads; no number changes."""
+        """Use up to `count` cores: rollouts in processes, policy and value updates in threads; same results."""
         self.collector.use_cores(count)
         self.loop.use_cores(count)
 
     def use_device(self, name: str) -> None:
-        """Update the networks on the device `name`, as torch calls it; rollouts stay on the processor."""
+        """Update the networks on torch's device `name`; rollouts stay on the CPU."""
         self.compute.device = torch.device(name)
 
     def policy(self) -> Policy:
@@ -88,6 +88,8 @@ class TwoPhaseLearner:
         """Collect one batch and learn from it."""
         steps = min(self.config.batch_size, remaining_steps)
         slots = slots_for(steps, self.problem.task.horizon + 1, self.config.num_slots)
+        # From the steps taken and left instead of a counter of batches: batches vary in length, and a resumed cell
+        # continues at the same place.
         self.annealing.set(self.env_steps / (self.env_steps + remaining_steps))
         batch = self.collect(steps, slots)
         self.env_steps += batch.env_steps
@@ -104,7 +106,7 @@ class TwoPhaseLearner:
         return self.collector.collect(explorer, steps, slots)
 
     def update(self, batch: Trajectories) -> dict[str, float]:
-        """Improve actor and value networks on a batch; return the logged values."""
+        """Update actor and value networks on a batch; return the logged values."""
         with self.compute.holding(self.modules(), self.optimizers):
             return self._update(batch)
 
@@ -112,6 +114,8 @@ class TwoPhaseLearner:
         steps = Steps.of(batch, self.compute)
         estimates = self.critic.estimate(batch, steps.observation)
         metrics = self._update_policy_and_value(steps, estimates) | self._stds()
+        # The design step may have its own updates. Observation statistics come last: ratios compare the new policy with
+        # the log-probabilities of the rollout, which used the old statistics.
         metrics |= self.credit.learn(batch)
         if self.config.normalize_observations:
             self.actor.update_statistics(steps.observation, steps.is_design)
@@ -122,6 +126,8 @@ class TwoPhaseLearner:
         config, optimizers = self.config, self.optimizers
         learned = self.credit.learned(steps.is_design)
         rows = torch.nonzero(learned)[:, 0].cpu().numpy()
+        # Normalised over the steps that this update learns from. Design steps, few and with a different spread, must
+        # not shift the scale when they have their own update.
         advantage = torch.zeros_like(estimates.advantage)
         advantage[learned] = normalized(estimates.advantage[learned])
         log_probs = self.credit.log_probs(steps)
@@ -135,9 +141,9 @@ class TwoPhaseLearner:
         return {"value_loss": value.loss, "kl": policy.divergence, "policy_steps": float(policy.steps)}
 
     def _old_log_prob(self, steps: Steps, log_probs: LogProbs, rows: Slots) -> Tensor:
-        """Return the log-probabilities (n,) that ratios are taken to: the rollout's, in single precision.
+        """Return the log-probabilities (n,) in the denominator of ratios: those of the rollout, in single precision.
 
-        In reduced precision they are computed again: ratios start at one only if both parts are rounded alike.
+        In reduced precision they are recomputed: ratios start at one only if both terms are rounded alike.
         """
         if not self.compute.reduced:
             return steps.log_prob

@@ -1,4 +1,4 @@
-"""Go over a batch in minibatches, with several networks' updates side by side.
+"""Iterate over a batch in minibatches, with the updates of several networks in parallel.
 
 Shapes: `n` rows of a batch, `m` rows of a minibatch.
 """
@@ -16,13 +16,13 @@ from codesign_bench.task import Slots
 
 
 class UpdateLoop:
-    """Takes the gradient steps of a batch's updates."""
+    """Takes the gradient steps of a batch."""
 
     def __init__(self) -> None:
         self._threads: ThreadPoolExecutor | None = None
 
     def use_cores(self, count: int) -> None:
-        """Run updates in two threads if there are two cores; no number changes."""
+        """Run updates in two threads if there are at least two cores; results do not change."""
         self._threads = None
         if count > 1:
             self._threads = ThreadPoolExecutor(2, initializer=torch.set_num_threads, initargs=(1,))
@@ -30,7 +30,9 @@ class UpdateLoop:
     def run(
         self, updates: Sequence[Update], rows: Slots, epochs: int, minibatch_size: int, rng: np.random.Generator
     ) -> None:
-        """Let every update go over the same minibatches of `rows` (n,); the updates must share nothing."""
+        """Run every update on the same minibatches of `rows` (n,); the updates must not share parameters."""
+        # All minibatches are drawn before any update runs: the order of threads, or a policy that stops early, then has
+        # no effect on the random numbers of the other updates and of later batches.
         parts = [rows[part] for _ in range(epochs) for part in minibatches(len(rows), minibatch_size, rng)]
 
         def learn(update: Update) -> None:
@@ -44,5 +46,5 @@ class UpdateLoop:
             list(self._threads.map(learn, updates))
 
     def step(self, update: Update, rows: Slots) -> None:
-        """Take one gradient step of `update` on `rows` (m,); a subclass may look on."""
+        """Take one gradient step of `update` on `rows` (m,); a subclass may observe it."""
         update.step(rows)

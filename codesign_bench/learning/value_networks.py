@@ -1,4 +1,4 @@
-"""Value networks: what a return is expected to be, from an observation.
+"""Value networks: the expected return of an observation.
 
 Shapes: `B` batch, `O` observation.
 """
@@ -17,34 +17,35 @@ from codesign_bench.task import Task
 
 
 class ValueNetwork(nn.Module):
-    """Maps observations (B, O) to returns (B,), in units of their running mean and deviation."""
+    """Maps observations (B, O) to returns (B,), normalised by their running mean and standard deviation."""
 
     def __init__(self) -> None:
         super().__init__()
+        # Mean 0 and variance 1 is the identity: with `normalize_returns` off, the statistics stay like this.
         self.returns = RunningNorm([-1.0], [1.0])
         with torch.no_grad():
             self.returns.variance.fill_(1.0)
 
     @abstractmethod
     def update_statistics(self, observation: Tensor) -> None:
-        """Take a batch of observations (B, O) into the running normalisation of the inputs."""
+        """Update the running normalisation of the inputs with observations (B, O)."""
 
     def update_returns(self, returns: Tensor) -> None:
-        """Take (B,) returns into their running mean and deviation."""
+        """Update the running mean and standard deviation of returns with returns (B,)."""
         self.returns.update(returns[:, None])
 
     def normalized(self, returns: Tensor) -> Tensor:
-        """Map (B,) returns to the units that the network learns."""
+        """Map (B,) returns to the network's normalised units."""
         return ((returns - self.returns.mean) / (self.returns.variance + 1e-8).sqrt()).float()
 
     def denormalized(self, observation: Tensor) -> Tensor:
-        """Return the expected returns (B,) for observations (B, O)."""
+        """Return the expected returns (B,), in units of the reward, for observations (B, O)."""
         values: Tensor = self(observation)
         return (values * (self.returns.variance + 1e-8).sqrt() + self.returns.mean).float()
 
 
 class GraphValue(ValueNetwork):
-    """Graph network over the tool with the phase as a further input, read at the held link by a tanh MLP."""
+    """Graph network over the tool with the phase as an additional input; a tanh MLP reads it at the held link."""
 
     def __init__(
         self, task: Task, graph_sizes: tuple[int, ...], mlp_sizes: tuple[int, ...], rng: np.random.Generator
@@ -69,7 +70,7 @@ class GraphValue(ValueNetwork):
 
 
 class MLPValue(ValueNetwork):
-    """Tanh MLP over state, goal, design and phase."""
+    """Tanh MLP on state, goal, design and phase."""
 
     def __init__(self, task: Task, sizes: tuple[int, ...], rng: np.random.Generator) -> None:
         super().__init__()
@@ -88,7 +89,7 @@ class MLPValue(ValueNetwork):
 
 
 class DesignValue(ValueNetwork):
-    """Small tanh MLP over state and goal: the design step's baseline under separate credit (ours)."""
+    """Small tanh MLP on state and goal: the baseline of the design step under separate credit (ours)."""
 
     SIZES = (64, 64)
 

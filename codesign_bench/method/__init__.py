@@ -1,6 +1,6 @@
-"""What a method is; everything that a new method needs is imported from here.
+"""The interface of a method; a new method imports everything it needs from here.
 
-`problem.py` is what it is asked to learn, `method.py` the method itself, `loading.py` methods by name.
+`problem.py` defines what a method learns, `method.py` the method itself, `loading.py` methods by name.
 """
 
 from codesign_bench.method.loading import load_method, method_names

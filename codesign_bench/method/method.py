@@ -1,4 +1,4 @@
-"""What a method is: it learns in batches, hands out its current policy, and can be saved and put back.
+"""The interface of a method: it trains in batches, returns its current policy, and can be saved and restored.
 
 Shapes: `B` batch (may be absent), `O` observation, `D` design, `C` control.
 A new method is one file in `methods/` with one public subclass of `Method`. The runner owns budget, evaluation,
@@ -23,26 +23,26 @@ Array = NDArray[Any]
 
 
 class Policy(Behaviour):
-    """A trained designer and controller that act with their means, as evaluation and everything after it uses them."""
+    """A trained designer and controller that act with their means, as used in evaluation and everything after it."""
 
     @abstractmethod
     def tensors(self) -> dict[str, Array]:
-        """Return all numbers that the policy needs, by name; `Method.make_policy` takes them back."""
+        """Return all arrays of the policy, by name; `Method.make_policy` restores the policy from them."""
 
 
 @dataclass
 class State:
-    """All that a method needs to resume exactly where it stopped."""
+    """Everything a method needs to resume exactly where it stopped."""
 
     arrays: dict[str, Array]
     """Networks, optimizers and the like, by name."""
     values: dict[str, Any]
     """JSON values by name."""
     large: dict[str, Array] = field(default_factory=dict)
-    """Arrays that take long to write, such as a replay buffer, by name.
+    """Arrays that take long to write, e.g. a replay buffer, by name.
 
-    The runner streams them to a separate file, and saves less often the longer that takes. They need not be copies:
-    they are written before training continues, and `Method.load_state` may keep those that it is given.
+    The runner streams them to a separate file; the longer that takes, the less often it saves. They need not be copies:
+    they are written before training continues, and `Method.load_state` may keep the arrays it gets.
     """
 
 
@@ -51,9 +51,9 @@ class BatchReport:
     """What one `Method.train` call did."""
 
     env_steps: int
-    """Simulated environment steps, design steps and every candidate's included."""
+    """Simulated environment steps, including design steps and the steps of all candidates."""
     metrics: dict[str, float]
-    """Logged values by name, each explained on the method's page."""
+    """Logged values by name; the method's page explains each."""
     gradient_steps: int = 0
     """Gradient steps that changed the policy."""
 
@@ -62,14 +62,14 @@ ConfigType = TypeVar("ConfigType")
 
 
 class Method(ABC, Generic[ConfigType]):
-    """A way of learning a tool's design together with its control, from task reward alone."""
+    """A method that learns a tool's design together with its control, from task reward only."""
 
     name: ClassVar[str]
-    """Its name, which is its file's name."""
+    """The method's name, which is also the name of its file."""
     label: ClassVar[str]
-    """Its name in figures."""
+    """The method's name in figures."""
     config_class: ClassVar[type]
-    """Frozen dataclass of its hyperparameters; each field's default is total, so that any task runs with it."""
+    """Frozen dataclass of the hyperparameters; every field has a default, and any task runs with the defaults."""
 
     def __init__(self, problem: Problem, config: ConfigType, streams: Streams) -> None:
         self.problem = problem
@@ -78,38 +78,38 @@ class Method(ABC, Generic[ConfigType]):
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
-        """Return what the method itself sets in `profile`: key -> (value, source). By default its defaults hold.
+        """Return the method's own settings in `profile`: key -> (value, source). By default none.
 
-        Profiles of studies may set more; a profile or a task that the method does not know gets general values.
+        Profiles of studies may set more. An unknown profile or task gets general values.
         """
         return {}
 
     @classmethod
     def derived(cls, config: ConfigType, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:
-        """Return settings that follow from the others of `config`, each with its source; by default none."""
+        """Return settings that follow from other settings of `config`, each with its source; by default none."""
         return {}
 
     @classmethod
     def small(cls) -> Mapping[str, Any]:
-        """Return settings with which a batch takes a fraction of a second, for tests; by default the defaults do."""
+        """Return settings with which a batch takes a fraction of a second, for tests; by default none."""
         return {}
 
     @property
     def shortest_batch(self) -> int:
-        """Most environment steps that `train` takes when one is left: an episode, unless several must be compared."""
+        """Most environment steps that `train` takes when one step is left: one episode, unless it compares several."""
         return self.problem.task.horizon + 1
 
     def use_cores(self, count: int) -> None:
-        """Use up to `count` cores from now on; no number may depend on it. By default a method uses one."""
+        """Use up to `count` cores from now on; results must not depend on it. By default a method uses one core."""
 
     def use_device(self, name: str) -> None:
-        """Compute updates on the device `name` ("cpu", "cuda") from now on. By default a method has no use for one."""
+        """Compute updates on the device `name` ("cpu", "cuda") from now on. No-op by default."""
 
     def start_from(self, tensors: Mapping[str, Array]) -> None:
-        """Take over a trained policy, as `Policy.tensors` described it, before any training.
+        """Start from a trained policy, given by `Policy.tensors`, before any training.
 
         Raises:
-            UserError: the method cannot.
+            UserError: the method does not support it.
         """
         raise UserError(f"method '{self.name}' cannot start from a trained policy")
 
@@ -117,8 +117,8 @@ class Method(ABC, Generic[ConfigType]):
     def train(self, remaining_steps: int) -> BatchReport:
         """Collect one batch of whole episodes and learn from it.
 
-        No episode is in progress when this returns: a checkpoint holds no simulator. That goes for off-policy methods,
-        too: they may update as often as they like within a batch, but they collect whole episodes.
+        No episode is in progress when this returns, because checkpoints do not save simulators. Off-policy methods also
+        collect whole episodes; they may update any number of times within a batch.
 
         Args:
             remaining_steps: environment steps left in the budget; the batch is about min(batch size, remaining steps)
@@ -127,12 +127,12 @@ class Method(ABC, Generic[ConfigType]):
 
     @abstractmethod
     def policy(self) -> Policy:
-        """Return the policy as it stands; later training may change it."""
+        """Return the current policy; later training may change it."""
 
     @classmethod
     @abstractmethod
     def make_policy(cls, task: Task, config: ConfigType, tensors: Mapping[str, Array]) -> Policy:
-        """Return the policy that `Policy.tensors` described."""
+        """Return the policy whose arrays `Policy.tensors` returned."""
 
     @abstractmethod
     def state(self) -> State:
@@ -140,4 +140,4 @@ class Method(ABC, Generic[ConfigType]):
 
     @abstractmethod
     def load_state(self, state: State) -> None:
-        """Resume from `state`; called on a freshly built method with the same problem, config and seed."""
+        """Resume from `state`; called on a new method with the same problem, config and seed."""

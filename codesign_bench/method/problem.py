@@ -1,4 +1,4 @@
-"""What a method is asked to learn.
+"""The learning problem that a method gets.
 
 Shapes: `N` evaluation instances, `I` instance.
 """
@@ -19,31 +19,33 @@ from codesign_bench.task.simulators import Simulators
 
 @dataclass(frozen=True)
 class Problem:
-    """What a method is asked to learn: a task, perhaps with a cutout of its instances and the trade-off reward."""
+    """The learning problem: a task, optionally with held-out instances, the trade-off reward or a set of instances."""
 
     task: Task
     cutout: float = 0.0
-    """Fraction of the training region whose instances are never trained on."""
+    """Fraction of the training region that is held out of training."""
     tradeoff: Tradeoff | None = None
     instances: Floats | None = None
-    """(k, I) the only instances to train and be judged on, or None: the task's own."""
+    """(k, I) the only instances for training and evaluation; None: the task's instances."""
 
     @cached_property
     def simulators(self) -> Simulators:
-        """The task's simulators in this process, which training and evaluation share."""
+        """The task's simulators in this process, shared by training and evaluation."""
         return Simulators(self.task)
 
     @contextmanager
     def episodes(self, num_slots: int) -> Iterator[Episodes]:
-        """Lend episodes of the task with at least `num_slots` slots, for the time of the `with` block."""
+        """Lend episodes of the task with at least `num_slots` slots for the duration of the `with` block."""
         with self.simulators.lend(num_slots) as simulator:
             yield Episodes(self.task, num_slots, self.tradeoff, simulator)
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
-        """Return (count, I) training instances: none from the cutout region."""
+        """Return (count, I) training instances, none of them in the cutout region."""
         if self.instances is not None:
             return self.instances[rng.integers(len(self.instances), size=count)]
         instances = self.task.sample_instances(rng, count)
+        # Redrawing only the excluded rows is rejection sampling: the result has the task's distribution, restricted to
+        # what is outside of the cutout, for a cutout of any shape.
         if self.cutout > 0.0:
             excluded = self.task.in_cutout(instances, self.cutout)
             while excluded.any():
@@ -52,5 +54,5 @@ class Problem:
         return instances
 
     def evaluation_instances(self) -> Floats:
-        """Return the (N, I) instances on which the method is judged."""
+        """Return the (N, I) instances on which the method is evaluated."""
         return self.task.evaluation_instances() if self.instances is None else self.instances

@@ -72,7 +72,7 @@ def read_cells(results: Path) -> tuple[list[PageCell], list[str]]:
     read = {cell.folder for cell in found}
     damaged = [path.parent for path in sorted(results.glob(CELL_PATTERN)) if path.parent not in read]
     if not cells:
-        raise UserError(f"no cells in '{results}' yet; make some with: codesign-bench run --out {results}")
+        raise UserError(f"no cells in '{results}' yet; create some with: codesign-bench run --out {results}")
     return cells, [folder.relative_to(results).as_posix() for folder in damaged]
 
 

@@ -1,1 +1,1 @@
-"""Results on disk: files written whole or not at all, the layout of a results folder, checkpoints, policies."""
+"""Results on disk: atomic writes, the layout of a results folder, checkpoints and policies."""

@@ -14,7 +14,7 @@ from codesign_bench.storage.records import CELL_FILE, DONE, INTERRUPTED, RUNNING
 
 @dataclass(frozen=True)
 class StoredCell:
-    """A cell on disk: its folder, and its record as it was when read."""
+    """A cell on disk: its folder, and its record at the time of reading."""
 
     folder: Path
     record: CellRecord
@@ -27,17 +27,17 @@ class StoredCell:
 
     @property
     def is_done(self) -> bool:
-        """Whether it is finished."""
+        """Whether the cell is finished."""
         return self.record.status == DONE
 
     @property
     def has_policy(self) -> bool:
-        """Whether its final policy is there; of shipped cells, some leave it out."""
+        """Whether its final policy is stored; some shipped cells omit it."""
         return (self.folder / POLICY_FILE).exists()
 
     def last_evaluation(self) -> dict[str, float]:
-        """Return the last row of its curve, empty where there is none."""
-        import pandas as pd  # takes a second, which `--help` would pay
+        """Return the last row of its curve, or an empty dictionary if there is none."""
+        import pandas as pd  # imported here because it takes a second, which `--help` need not pay
 
         try:
             return {str(name): float(value) for name, value in pd.read_csv(self.folder / CURVE_FILE).iloc[-1].items()}
@@ -59,13 +59,13 @@ def open_cell(folder: str | Path) -> StoredCell:
 
 
 def find_cells(out: Path) -> Iterator[StoredCell]:
-    """Yield every cell below `out`, in order of path; what cannot be read is passed over.
+    """Yield every cell below `out`, in order of path; unreadable cells are skipped.
 
     Raises:
-        UserError: there is no such folder.
+        UserError: the folder does not exist.
     """
     if not out.is_dir():
-        raise UserError(f"no results folder '{out}'; make one with: codesign-bench run --out {out}")
+        raise UserError(f"no results folder '{out}'; create it with: codesign-bench run --out {out}")
     for path in sorted(out.glob(CELL_PATTERN)):
         try:
             yield open_cell(path.parent)

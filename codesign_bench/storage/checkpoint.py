@@ -1,12 +1,11 @@
-"""All that an interrupted cell needs to resume bit for bit, without pickle.
+"""Checkpoints: everything an interrupted cell needs to resume bit for bit, without pickle.
 
-A checkpoint is one file, `checkpoint.safetensors`, or two: what a method calls large goes to a `.npz` file beside it,
-`checkpoint.large-<generation>.npz`, array by array and in pieces, so that nothing holds a second copy of it.
+A checkpoint is one file, `checkpoint.safetensors`, or two: the large arrays of a method (`State.large`) are in a second
+file, `checkpoint.large-<generation>.npz`. They are streamed array by array, so that memory never holds a second copy.
 
-The pair is consistent whenever a process is killed. The large file is written first, under a name that no file has
-yet; then the small file, which names it and its checksums, is replaced in one step; then older large files are
-removed. So the small file on disk always names a complete large file of the same moment. Between two saves neither
-file changes: a small file that moved on alone would belong to another moment than its large one.
+The pair is consistent whenever a process is killed. The large file is written first, under a new name; then the small
+file, which has the large file's name and checksums, is replaced atomically; then older large files are removed. So the
+small file on disk always names a complete large file that was saved with it.
 """
 
 from __future__ import annotations
@@ -29,16 +28,16 @@ from codesign_bench.method import Array, State
 from codesign_bench.storage.files import dump_json, replacing, write_bytes
 
 HEADER = "codesign_bench"
-"""The key of the JSON header in the file's metadata."""
+"""Key of the JSON header in the file's metadata."""
 PIECE = 2**20
-"""Bytes that are read at once where a file is only checked."""
+"""Bytes per read when a file is only checked."""
 DAMAGED_ZIP = (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError, zlib.error)
-"""What reading a damaged `.npz` file raises."""
+"""The exceptions of reading a damaged `.npz` file."""
 
 
 @dataclass
 class Progress:
-    """Where a cell stands; the curve's rows are part of it, so that file and learner can never disagree."""
+    """The progress of a cell, including the rows of its curve, so that curve and learner always agree."""
 
     env_steps: int = 0
     gradient_steps: int = 0
@@ -51,7 +50,7 @@ class Progress:
     train_s: float = 0.0
     evaluate_s: float = 0.0
     wall_s: float = 0.0
-    """Seconds since the cell's start, time between interruption and resumption left out."""
+    """Seconds since the cell's start, without the time between interruption and resumption."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class Checkpoint:
 
 
 def save_arrays(path: Path, arrays: Mapping[str, Array], header: Mapping[str, Any]) -> None:
-    """Replace `path` by `arrays` and a JSON `header`, guarded by a checksum."""
+    """Replace `path` by `arrays` and a JSON `header`, with a checksum."""
     ordered = {name: np.asarray(array, order="C") for name, array in arrays.items()}
     text = dump_json({**header, "checksum": _checksum((name, [ordered[name].tobytes()]) for name in sorted(ordered))})
     write_bytes(path, save(ordered, metadata={HEADER: text}))
@@ -74,8 +73,8 @@ def load_arrays(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
     """Return arrays and header that `save_arrays` wrote.
 
     Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: it is damaged or something else.
+        FileNotFoundError: the file does not exist.
+        ValueError: it is damaged or another kind of file.
     """
     header = _checked_header(path)
     try:
@@ -85,7 +84,7 @@ def load_arrays(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
 
 
 def save_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
-    """Replace the checkpoint in `path`, and what is large of it beside."""
+    """Replace the checkpoint in `path` and its large file."""
     large, checksums = None, None
     if checkpoint.state.large:
         large = path.with_name(f"{path.stem}.large-{1 + max(map(_generation, _large_files(path)), default=0)}.npz")
@@ -103,7 +102,7 @@ def save_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
 
 
 def load_checkpoint(path: Path) -> Checkpoint | None:
-    """Return the checkpoint in `path`, or None when there is none.
+    """Return the checkpoint in `path`, or None if there is none.
 
     Raises:
         UserError: it is truncated or damaged.
@@ -112,7 +111,7 @@ def load_checkpoint(path: Path) -> Checkpoint | None:
 
 
 def check_checkpoint(path: Path) -> None:
-    """Check the checkpoint in `path`, if there is one, by its header and its checksums, a piece at a time.
+    """Check header and checksums of the checkpoint in `path`, if there is one, without loading it whole.
 
     Raises:
         UserError: it is truncated or damaged.
@@ -121,7 +120,7 @@ def check_checkpoint(path: Path) -> None:
 
 
 def remove_checkpoint(path: Path) -> None:
-    """Remove the checkpoint in `path`, and what is large of it beside."""
+    """Remove the checkpoint in `path` and its large files."""
     path.unlink(missing_ok=True)
     for large in _large_files(path):
         large.unlink(missing_ok=True)
@@ -140,7 +139,7 @@ def _check_checkpoint(path: Path) -> None:
 
 
 def _usable(path: Path, read: Callable[[Path], Any]) -> Any:
-    """Return what `read` makes of `path`, or None when there is no such file.
+    """Return the result of `read(path)`, or None if the file does not exist.
 
     Raises:
         UserError: it is truncated or damaged.
@@ -150,15 +149,15 @@ def _usable(path: Path, read: Callable[[Path], Any]) -> Any:
     try:
         return read(path)
     except (ValueError, KeyError, TypeError, OSError) as error:
-        raise UserError(f"checkpoint {path} is unusable ({error}); delete it to start its cell again") from error
+        raise UserError(f"checkpoint {path} is unusable ({error}); delete it to restart the cell") from error
 
 
 def _checked_header(path: Path) -> dict[str, Any]:
-    """Return the header that `save_arrays` wrote, after a look at every byte of the arrays.
+    """Return the header that `save_arrays` wrote, after checking every byte of the arrays.
 
     Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: it is damaged or something else.
+        FileNotFoundError: the file does not exist.
+        ValueError: it is damaged or another kind of file.
     """
     with path.open("rb") as stream:
         try:
@@ -177,7 +176,7 @@ def _checked_header(path: Path) -> dict[str, Any]:
 
 
 def _pieces(stream: BinaryIO, start: int, end: int) -> Iterator[bytes]:
-    """Yield the bytes from `start` to `end` of a file, as far as it has them."""
+    """Yield the bytes from `start` to `end` of a file in pieces, fewer if the file is shorter."""
     stream.seek(start)
     while start < end and (piece := stream.read(min(PIECE, end - start))):
         start += len(piece)
@@ -185,7 +184,7 @@ def _pieces(stream: BinaryIO, start: int, end: int) -> Iterator[bytes]:
 
 
 def _checksum(contents: Iterator[tuple[str, Any]]) -> int:
-    """Return the checksum of arrays: names in alphabetical order, each with the pieces of its bytes."""
+    """Return the checksum of arrays, given in alphabetical order as names and pieces of their bytes."""
     total = 0
     for name, pieces in contents:
         total = zlib.crc32(name.encode(), total)
@@ -195,7 +194,7 @@ def _checksum(contents: Iterator[tuple[str, Any]]) -> int:
 
 
 def _large_files(path: Path) -> list[Path]:
-    """Return all large files beside the checkpoint `path`, whichever of them it names."""
+    """Return all large files next to the checkpoint `path`, including those that it does not name."""
     found = path.parent.glob(f"{path.stem}.large-*.npz")
     return [large for large in found if large.stem.rpartition("-")[2].isdigit()]
 
@@ -205,7 +204,7 @@ def _generation(large: Path) -> int:
 
 
 def _save_large(path: Path, arrays: Mapping[str, Array]) -> dict[str, int]:
-    """Replace `path` by arrays, which numpy hands on in pieces; return their checksums by name."""
+    """Replace `path` by arrays, which numpy writes in pieces; return their checksums by name."""
     with replacing(path) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         for name, array in arrays.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
@@ -218,11 +217,11 @@ def _checksums(archive: zipfile.ZipFile) -> dict[str, int]:
 
 
 def _read_large(path: Path, header: Mapping[str, Any], read: Callable[[BinaryIO], Any]) -> dict[str, Any]:
-    """Return name -> what `read` makes of each large array of the checkpoint in `path`, which has this header.
+    """Return name -> `read(array)` for each large array of the checkpoint in `path` with this header.
 
     Raises:
-        OSError: there is no such file.
-        ValueError: it is damaged, or another one than the header names.
+        OSError: the file does not exist.
+        ValueError: it is damaged, or not the one that the header names.
     """
     if header.get("large") is None:
         return {}
@@ -230,9 +229,9 @@ def _read_large(path: Path, header: Mapping[str, Any], read: Callable[[BinaryIO]
     try:
         with zipfile.ZipFile(large) as archive:
             if _checksums(archive) != header["large"]["checksums"]:
-                raise ValueError("it is another one than the checkpoint names")
+                raise ValueError("its checksums are not those of the checkpoint")
             for info in archive.infolist():
-                with archive.open(info) as member:  # Compares the checksum once the last byte is read.
+                with archive.open(info) as member:  # compares the checksum after the last byte
                     found[info.filename.removesuffix(".npy")] = read(cast(BinaryIO, member))
     except DAMAGED_ZIP as error:
         raise ValueError(f"{large.name} is damaged: {error}") from error

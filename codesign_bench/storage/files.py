@@ -1,4 +1,4 @@
-"""Write files whole or not at all, so that a kill at any moment leaves the old file or the new one."""
+"""Write files atomically: a kill at any moment leaves the old file or the new one."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ import numpy as np
 
 @contextmanager
 def replacing(path: Path, *, durable: bool = True) -> Iterator[BinaryIO]:
-    """Give a stream whose content replaces `path` in one step once the `with` block has ended without an error.
+    """Give a stream whose content replaces `path` atomically when the `with` block ends without an error.
 
-    `durable` waits until the disk has it.
+    `durable` waits until the content is on disk.
     """
     descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-", suffix=".partial")
     try:
@@ -34,23 +34,23 @@ def replacing(path: Path, *, durable: bool = True) -> Iterator[BinaryIO]:
 
 
 def write_bytes(path: Path, content: bytes, *, durable: bool = True) -> None:
-    """Replace `path` by `content` in one step; `durable` waits until the disk has it."""
+    """Replace `path` by `content` atomically; `durable` waits until it is on disk."""
     with replacing(path, durable=durable) as stream:
         stream.write(content)
 
 
 def write_json(path: Path, values: Any, *, durable: bool = True) -> None:
-    """Replace `path` by `values` as indented JSON; numpy numbers become plain ones."""
+    """Replace `path` by `values` as indented JSON; numpy numbers become Python numbers."""
     write_bytes(path, (dump_json(values, indent=2) + "\n").encode(), durable=durable)
 
 
 def dump_json(values: Any, indent: int | None = None) -> str:
-    """Return `values` as JSON; numpy numbers and arrays become plain ones, floats survive the round trip exactly."""
+    """Return `values` as JSON; numpy numbers and arrays become Python ones, and floats are restored exactly."""
     return json.dumps(values, indent=indent, default=_plain)
 
 
 def remove_partial_files(folder: Path) -> None:
-    """Remove what a killed process left half-written in `folder`; only for the holder of its lock."""
+    """Remove unfinished files that a killed process left in `folder`; call it only while holding its lock."""
     for leftover in folder.glob(".*.partial"):
         leftover.unlink(missing_ok=True)
 
@@ -60,4 +60,4 @@ def _plain(value: Any) -> Any:
         return value.item()
     if isinstance(value, np.ndarray):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} is no JSON value")
+    raise TypeError(f"{type(value).__name__} is not a JSON value")

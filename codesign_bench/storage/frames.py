@@ -1,4 +1,4 @@
-"""Results as tidy frames: every row carries what identifies its cell, every axis of its variant among it."""
+"""Results as tidy frames: every row identifies its cell, including every axis of its variant."""
 
 from __future__ import annotations
 
@@ -12,40 +12,40 @@ from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import StoredCell, find_cells
 from codesign_bench.storage.layout import CURVE_COLUMNS, CURVE_FILE, EVALUATION_FILE
 
-if TYPE_CHECKING:  # pandas takes a second to import, which every cell's process would pay
+if TYPE_CHECKING:  # pandas takes a second to import; cell processes do not need it
     import pandas as pd
 
 LABEL_COLUMN = "label"
-"""The method's name in figures, beside the columns that identify the cell."""
+"""Column with the method's name in figures; the other columns identify the cell."""
 
 
 def load_results(out: str | Path) -> pd.DataFrame:
-    """Return every evaluation of every cell below `out`, running and failed ones included, as one tidy frame.
+    """Return every evaluation of every cell below `out`, including running and failed cells, as one tidy frame.
 
-    Columns: task, method, variant, one for each axis (cutout, alpha, finetune, scratch, and whatever else a cell
-    varies; NaN where it is not varied), seed, label, then those of `curve.csv`.
+    Columns: task, method, variant, one for each axis (cutout, alpha, finetune, scratch, and any other axis of a cell;
+    NaN where it is not varied), seed, label, then those of `curve.csv`.
 
     Raises:
-        UserError: there is no such folder, or no result in it.
+        UserError: the folder does not exist or contains no results.
     """
     import pandas as pd
 
     parts = [(cell, curve) for cell in find_cells(Path(out)) if (curve := _read_curve(cell)) is not None]
     if not parts:
-        raise UserError(f"no results in '{out}' yet; make some with: codesign-bench run --out {out}")
+        raise UserError(f"no results in '{out}' yet; create some with: codesign-bench run --out {out}")
     frame = pd.concat(_with_cell_columns(parts), ignore_index=True)
     return frame.astype({"seed": int, "env_steps": int})
 
 
 def load_evaluations(out: str | Path) -> pd.DataFrame:
-    """Return what every finished cell below `out` reached on each evaluation instance, as one tidy frame.
+    """Return the final result of every finished cell below `out` on each evaluation instance, as one tidy frame.
 
     Columns: those of `load_results` up to `label`, then `instance` (its number), `instance_<name>` and `design_<name>`
     in the task's units (NaN for the entries of other tasks), return, success, episode_length, material, effort, and
-    in_cutout where the task has positions.
+    in_cutout if the task has positions.
 
     Raises:
-        UserError: there is no such folder, or no finished cell in it.
+        UserError: the folder does not exist or contains no finished cell.
     """
     import pandas as pd
 
@@ -56,20 +56,20 @@ def load_evaluations(out: str | Path) -> pd.DataFrame:
             table.insert(0, "instance", range(len(table)))
             parts.append((cell, table))
     if not parts:
-        raise UserError(f"no finished cell in '{out}' yet; make some with: codesign-bench run --out {out}")
+        raise UserError(f"no finished cell in '{out}' yet; create some with: codesign-bench run --out {out}")
     return pd.concat(_with_cell_columns(parts), ignore_index=True).astype({"seed": int})
 
 
 def default_rows(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of cells that vary nothing."""
+    """Return the rows of cells of the default variant."""
     return frame[frame["variant"] == DEFAULT_NAME]
 
 
 def rows_varying(frame: pd.DataFrame, axis: str) -> pd.DataFrame:
-    """Return the rows of cells that vary this axis and no other."""
+    """Return the rows of cells that vary only this axis."""
     if axis not in frame.columns:
         return frame.iloc[:0]
-    kind = axis_named(axis).kind  # a column holds whole numbers beside NaN as floats
+    kind = axis_named(axis).kind  # pandas stores a column of integers and NaN as floats
     names = {value: Variant.of(**{axis: kind(value)}).name for value in frame[axis].dropna().unique()}
     return frame[frame["variant"] == frame[axis].map(names)]
 
@@ -83,7 +83,7 @@ def require_columns(frame: pd.DataFrame, columns: Sequence[str], what: str) -> N
         what: what the frame holds, for the message.
 
     Raises:
-        UserError: naming what is missing.
+        UserError: rows or columns are missing; the message names them.
     """
     missing = [column for column in columns if column not in frame.columns]
     if missing:
@@ -93,7 +93,7 @@ def require_columns(frame: pd.DataFrame, columns: Sequence[str], what: str) -> N
 
 
 def _with_cell_columns(parts: Sequence[tuple[StoredCell, pd.DataFrame]]) -> list[pd.DataFrame]:
-    """Put what identifies each cell in front of its table's own columns; all tables get the same axes."""
+    """Insert the columns that identify each cell before its table's columns; all tables get the same axes."""
     axes = in_axis_order({*FIRST_AXES, *(axis for cell, _ in parts for axis, _ in cell.record.variant)})
     for cell, table in parts:
         record = cell.record
@@ -121,6 +121,6 @@ def _read_curve(cell: StoredCell) -> pd.DataFrame | None:
 
     try:
         curve = pd.read_csv(cell.folder / CURVE_FILE)
-    except (OSError, ValueError):  # not evaluated yet, or no table
+    except (OSError, ValueError):  # not evaluated yet, or not a table
         return None
     return None if curve.empty or not set(CURVE_COLUMNS) <= set(curve.columns) else curve

@@ -1,10 +1,10 @@
-"""The layout of a results folder: names of files, the marker that it is ours, and the locks of running cells.
+"""The layout of a results folder: names of files, the marker file, and the locks of running cells.
 
-OUT/codesign-bench.json                                  marks the folder as ours
+OUT/codesign-bench.json                                  marks a results folder
 OUT/<task>/<method>/<variant>/seed-00/cell.json          status, configuration with sources, versions, host, timings
                                      /curve.csv          one row per evaluation
-                                     /metrics.csv        the method's own metrics, averaged between evaluations
-                                     /evaluation.csv     each evaluation instance at the end: design, return, success
+                                     /metrics.csv        the method's metrics, averaged between evaluations
+                                     /evaluation.csv     final design, return and success on each evaluation instance
                                      /policy.safetensors final networks
                                      /checkpoint.safetensors, progress.json, cell.lock, output.log   while it runs
 """
@@ -25,7 +25,7 @@ from codesign_bench.storage.records import CELL_FILE
 
 MARKER_FILE = "codesign-bench.json"
 LAYOUT_SCHEMA = 1
-"""Of the folders below a results folder; that of a cell file is its own."""
+"""Version of the folder layout; cell files have their own version."""
 CURVE_FILE = "curve.csv"
 METRICS_FILE = "metrics.csv"
 EVALUATION_FILE = "evaluation.csv"
@@ -43,20 +43,20 @@ def open_folder(out: Path) -> None:
     """Make `out` a results folder, or check that it is one.
 
     Raises:
-        UserError: it cannot be written, or holds something else.
+        UserError: it is not writable, or contains other files.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
         ours = (out / MARKER_FILE).exists() or any(out.glob(CELL_PATTERN))
         if not ours and any(out.iterdir()):
-            raise UserError(f"--out {out}: the folder holds other files than results; choose an empty or a new folder")
+            raise UserError(f"--out {out}: the folder contains files other than results; choose an empty or new folder")
         write_json(out / MARKER_FILE, {"schema": LAYOUT_SCHEMA, "content": "results of codesign-bench run"})
     except OSError as error:
-        raise UserError(f"--out {out}: cannot write there ({error.strerror})") from error
+        raise UserError(f"--out {out}: not writable ({error.strerror})") from error
 
 
 def write_rows(path: Path, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> None:
-    """Replace the CSV file `path` by `rows`; `columns` come first and are there even without rows."""
+    """Replace the CSV file `path` by `rows`; `columns` come first and are written even without rows."""
     names = list(dict.fromkeys((*columns, *(name for row in rows for name in row))))
     table = io.StringIO()
     writer = csv.DictWriter(table, names, lineterminator="\n")
@@ -66,12 +66,12 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, Any]], columns: Sequence[
 
 
 def cell_lock(folder: Path) -> filelock.BaseFileLock:
-    """Return the lock that the process running the cell in `folder` holds."""
+    """Return the lock of the cell in `folder`, held by the process that runs the cell."""
     return filelock.FileLock(folder / LOCK_FILE)
 
 
 def is_locked(folder: Path) -> bool:
-    """Return whether some process is running the cell in `folder` now."""
+    """Return whether a process is running the cell in `folder`."""
     if not (folder / LOCK_FILE).exists():
         return False
     lock = cell_lock(folder)
@@ -79,7 +79,7 @@ def is_locked(folder: Path) -> bool:
         lock.acquire(timeout=0)
     except filelock.Timeout:
         return True
-    except OSError:  # a folder that may only be read: nobody runs anything there
+    except OSError:  # a read-only folder, in which nothing can run
         return False
     lock.release()
     return False

@@ -1,4 +1,4 @@
-"""Save a cell's final policy and load it again, without pickle."""
+"""Save and load a cell's final policy, without pickle."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from codesign_bench.task import Task, load_task
 
 
 def save_policy(folder: Path, policy: Policy, header: dict[str, Any]) -> None:
-    """Write the tensors of `policy` into a cell's folder; `header` says whose they are."""
+    """Write the tensors of `policy` to a cell's folder; `header` names task and method."""
     save_arrays(folder / POLICY_FILE, policy.tensors(), header)
 
 
 def load_policy(folder: str | Path) -> Policy:
-    """Return the final policy of the cell in `folder`; `design(observation)` and `act(observation)` take its means.
+    """Return the final policy of the cell in `folder`; `design(observation)` and `act(observation)` return its means.
 
     Raises:
-        UserError: the folder holds no finished cell, or its files are damaged or do not fit this version.
+        UserError: the folder has no finished cell, or its files are damaged or incompatible with this version.
     """
     return policy_of(open_cell(folder))
 
@@ -32,7 +32,7 @@ def policy_of(cell: StoredCell) -> Policy:
     """Return the final policy of a cell.
 
     Raises:
-        UserError: it is not finished, or its files are damaged or do not fit this version.
+        UserError: it is not finished, or its files are damaged or incompatible with this version.
     """
     tensors, record = policy_tensors(cell), cell.record
     method_class = load_method(record.method)
@@ -41,14 +41,14 @@ def policy_of(cell: StoredCell) -> Policy:
         return method_class.make_policy(load_task(record.task), config, tensors)
     except (KeyError, ValueError, RuntimeError) as error:
         path = cell.folder / POLICY_FILE
-        raise UserError(f"{path} does not fit method '{record.method}' of this version: {error}") from error
+        raise UserError(f"{path} is incompatible with method '{record.method}' of this version: {error}") from error
 
 
 def policy_and_task(folder: Path, name: str | None) -> tuple[Policy, Task]:
     """Return the final policy of the cell in `folder` and its task.
 
     Raises:
-        UserError: it is not a finished cell, or was trained on another task than `name`.
+        UserError: it is not a finished cell, or was trained on a task other than `name`.
     """
     cell = open_cell(folder)
     trained_on = cell.record.task
@@ -68,6 +68,6 @@ def policy_tensors(cell: StoredCell) -> dict[str, Array]:
         return load_arrays(path)[0]
     except FileNotFoundError:
         state = "its policy file is missing" if cell.is_done else f"its status is '{cell.status}'"
-        raise UserError(f"'{cell.folder}' holds no final policy: {state}") from None
+        raise UserError(f"'{cell.folder}' has no final policy: {state}") from None
     except ValueError as error:
         raise UserError(f"cannot load {path}: {error}") from error

@@ -1,4 +1,4 @@
-"""The cell file, `cell.json`: what a cell is, how it was made, how far it is. Read, checked and written here alone."""
+"""The cell file, `cell.json`: identity, configuration and status of a cell. Only this module reads and writes it."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from codesign_bench.storage.files import write_json
 
 CELL_FILE = "cell.json"
 SCHEMA = 2
-"""Version 1 held each axis of the variant beside the other entries, and no axes but the first four."""
+"""Version 1 stored the first four axes of the variant as top-level entries, and no other axes."""
 
 RUNNING, DONE, FAILED = "running", "done", "failed"
 INTERRUPTED = "interrupted"
-"""Not stored: a cell that is recorded as running while no process holds its lock."""
+"""Not stored: the status of a cell that is recorded as running while no process holds its lock."""
 
 
 @dataclass(frozen=True)
 class Timings:
-    """When a cell ran, and how long it took, interruptions left out."""
+    """When a cell ran, and how long it took without interruptions."""
 
     started: str | None = None
     """UTC, ISO 8601."""
     ended: str | None = None
-    """UTC, ISO 8601; None while it runs."""
+    """UTC, ISO 8601; None while the cell runs."""
     train_s: float | None = None
     evaluate_s: float | None = None
     wall_s: float | None = None
@@ -47,7 +47,7 @@ class Failure:
 
     @property
     def last_line(self) -> str:
-        """The last line of the traceback, or the message where there is none."""
+        """The last line of the traceback, or the message if there is none."""
         lines = self.traceback.strip().splitlines()
         return lines[-1] if lines else self.message
 
@@ -76,15 +76,15 @@ class CellRecord:
 
     @property
     def threads(self) -> int:
-        """Cores of the cell."""
+        """Number of cores of the cell."""
         return int(self.host.get("threads", 1))
 
     @classmethod
     def read(cls, folder: Path) -> CellRecord | None:
-        """Return the record in `folder`, or None when there is none.
+        """Return the record in `folder`, or None if there is none.
 
         Raises:
-            UserError: it is not one of ours, or damaged.
+            UserError: it is damaged or not a cell file.
         """
         path = folder / CELL_FILE
         try:
@@ -93,19 +93,19 @@ class CellRecord:
             return None
         except (ValueError, KeyError, TypeError, AttributeError, OSError) as error:
             reason = f"no {error}" if isinstance(error, KeyError) else str(error)
-            raise UserError(f"cannot read {path} ({reason}); delete its folder to start the cell again") from error
+            raise UserError(f"cannot read {path} ({reason}); delete its folder to restart the cell") from error
 
     def write(self, folder: Path) -> None:
         """Replace the record in `folder`."""
         write_json(folder / CELL_FILE, self.to_json())
 
     def ended(self, status: str, **changes: Any) -> CellRecord:
-        """Return the record of the cell now that it has ended with `status`; `changes` are further fields."""
+        """Return the record of the cell after it ended with `status`; `changes` are other fields to set."""
         timings = replace(changes.pop("timings", self.timings), started=self.timings.started, ended=now())
         return replace(self, status=status, timings=timings, **changes)
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON values."""
+        """Return the record as JSON values."""
         return {
             "schema": SCHEMA,
             "status": self.status,
@@ -127,14 +127,14 @@ class CellRecord:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> CellRecord:
-        """Return the record that `to_json` of this version or of version 0.1.0 (schema 1) told.
+        """Return the record that `to_json` of this version or of version 0.1.0 (schema 1) wrote.
 
         Raises:
-            ValueError, KeyError, TypeError, AttributeError: `content` is something else.
+            ValueError, KeyError, TypeError, AttributeError: `content` is not a record.
         """
         schema, status = content["schema"], content["status"]
         if schema not in (1, SCHEMA):
-            raise ValueError(f"schema {schema}, made by a newer version; this one reads up to {SCHEMA}")
+            raise ValueError(f"schema {schema} is from a newer version; this version reads up to {SCHEMA}")
         if status not in (RUNNING, DONE, FAILED):
             raise ValueError(f"unknown status {status!r}")
         axes = {name: content.get(name) for name in FIRST_AXES} if schema == 1 else content["axes"]
@@ -158,7 +158,7 @@ class CellRecord:
 
 
 def now() -> str:
-    """Return the time, UTC, as records hold it."""
+    """Return the current time, UTC, in the format of records."""
     return datetime.now(timezone.utc).isoformat(timespec="seconds")
 
 

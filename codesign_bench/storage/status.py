@@ -1,4 +1,4 @@
-"""How far a cell is, as one line of text."""
+"""The progress of a cell as one line of text."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from codesign_bench.storage.cells import StoredCell
 
 
 def status_row(out: Path, cell: StoredCell) -> tuple[str, ...]:
-    """Return a cell's line as text: path below `out`, status, steps, budget, last return and success."""
+    """Return the columns of a cell's line: path below `out`, status, steps, budget, last return and success."""
     last = cell.last_evaluation()
     env_steps = max(int(last.get("env_steps", 0)), cell.record.env_steps)
     return (

@@ -1,4 +1,4 @@
-"""Tables that are measured once and kept beside the cells."""
+"""Tables of measurements that are stored next to the cells."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def csv_bytes(table: pd.DataFrame) -> bytes:
 
 
 def read_table(path: Path) -> pd.DataFrame | None:
-    """Return the table in `path`, or None when there is none."""
+    """Return the table in `path`, or None if there is none."""
     import pandas as pd
 
     return pd.read_csv(path) if path.exists() else None
@@ -28,7 +28,7 @@ def write_table(results: Path, path: Path, table: pd.DataFrame) -> None:
     """Replace the table in `path`, below the results folder `results`.
 
     Raises:
-        UserError: the folder cannot be written, or holds something else than results.
+        UserError: the folder is not writable, or contains other files than results.
     """
     open_folder(results)
     path.parent.mkdir(parents=True, exist_ok=True)

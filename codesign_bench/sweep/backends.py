@@ -1,7 +1,7 @@
-"""Where the cells of a sweep run: in worker processes of this machine, or on a Dask cluster. Both through joblib.
+"""Backends that run the cells of a sweep, both through joblib: worker processes of this machine, or a Dask cluster.
 
-A backend yields the outcomes of jobs as they come and takes everything down that it started, on every way out. When
-workers die, it raises `WorkersDied`; the jobs that have not ended go on from their checkpoints when dispatched again.
+A backend yields the outcomes of jobs as they end, and stops everything that it started on every exit. If workers die,
+it raises `WorkersDied`; unfinished jobs resume from their checkpoints when they are dispatched again.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CONNECT_SECONDS = 10.0
 
 
 class WorkersDied(Exception):
-    """Worker processes are gone, and with them the jobs that they were running."""
+    """Worker processes died during their jobs."""
 
 
 class Backend(ABC):
@@ -40,14 +40,14 @@ class Backend(ABC):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Take down what was started."""
+        """Stop everything that the backend started."""
 
     @abstractmethod
     def dispatch(self, queue: Sequence[Job]) -> Iterator[Outcome]:
-        """Yield the outcomes of jobs as they come.
+        """Yield the outcomes of jobs as they end.
 
         Raises:
-            WorkersDied: some jobs have no outcome.
+            WorkersDied: workers died, and some jobs have no outcome.
         """
 
 
@@ -60,10 +60,10 @@ class LokyBackend(Backend):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Leave the idle workers to joblib, which reuses them and ends them with this process."""
+        """Do nothing: joblib reuses the idle workers and ends them with this process."""
 
     def dispatch(self, queue: Sequence[Job]) -> Iterator[Outcome]:
-        """Yield the outcomes of jobs as they come."""
+        """Yield the outcomes of jobs as they end."""
         pool = Parallel(
             n_jobs=self.jobs,
             backend="loky",
@@ -84,9 +84,9 @@ class LokyBackend(Backend):
 
 
 class DaskBackend(Backend):
-    """The workers of a Dask cluster: that of a scheduler, or one started here with `jobs` workers.
+    """The workers of a Dask cluster: that of `scheduler`, or a local one with `jobs` workers.
 
-    The results folder must be one that all workers see under the same path.
+    All workers must see the results folder under the same path.
     """
 
     def __init__(self, jobs: int, scheduler: str | None) -> None:
@@ -111,18 +111,18 @@ class DaskBackend(Backend):
             try:
                 stack.enter_context(Client(where, timeout=CONNECT_SECONDS, set_as_default=True))
             except (OSError, ValueError) as error:
-                raise UserError(f"--scheduler {self.scheduler}: no Dask scheduler answers there") from error
+                raise UserError(f"--scheduler {self.scheduler}: no Dask scheduler answers at this address") from error
             self._stack = stack.pop_all()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Disconnect; a cluster that was started here ends."""
+        """Disconnect; stop the cluster if it is a local one."""
         self._stack.close()
 
     def dispatch(self, queue: Sequence[Job]) -> Iterator[Outcome]:
-        """Yield the outcomes of jobs as they come; a job whose worker dies is given to another."""
+        """Yield the outcomes of jobs as they end; Dask moves the job of a dead worker to another worker."""
         from distributed.scheduler import KilledWorker
 
         jobs = [replace(job, out=str(Path(job.out).resolve())) for job in queue]
@@ -138,12 +138,12 @@ def make_backend(name: str, jobs: int, scheduler: str | None) -> Backend:
     """Return the backend `name`.
 
     Raises:
-        UserError: an unknown name, or a scheduler for a backend without one.
+        UserError: an unknown name, or a scheduler for a backend that uses none.
     """
     if name == "dask":
         return DaskBackend(jobs, scheduler)
     if name != "loky":
         raise UserError(f"--backend {name}: choose from: {', '.join(BACKENDS)}")
     if scheduler is not None:
-        raise UserError("--scheduler goes with --backend dask")
+        raise UserError("--scheduler needs --backend dask")
     return LokyBackend(jobs)

@@ -1,6 +1,6 @@
-"""The process of one cell: it holds the cell's lock, runs it, records the outcome, and ends when its parent goes away.
+"""The process of one cell: it holds the cell's lock, runs the cell, records the outcome, and ends when its parent dies.
 
-Started by `codesign_bench.sweep.workers` with the numerical libraries' threads already set in its environment.
+Started by `codesign_bench.sweep.workers`, with the number of threads of numerical libraries set in its environment.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from codesign_bench.sweep.training import CellRun
 
 EXIT_DONE, EXIT_FAILED, EXIT_REFUSED, EXIT_BUSY = 0, 1, 2, 75
 LOCK_SECONDS = 2.0
-"""Longer than a look at the lock by `status` takes."""
+"""Longer than `status` holds the lock to check it."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the cell that the first argument describes in JSON, below the folder that the second names.
+    """Run a cell, given as JSON by the first argument, in the results folder of the second argument.
 
-    A third argument `retry` runs a failed cell again. Returns one of the exit codes above.
+    With `retry` as the third argument, a failed cell runs again. Returns one of the exit codes above.
     """
     cell_json, out, *options = sys.argv[1:] if arguments is None else arguments
     cell = Cell.from_json(cell_json)
@@ -49,7 +49,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def run_locked(cell: Cell, folder: Path, *, retry: bool) -> int:
-    """Run `cell` as the holder of its lock, unless another process was quicker; return the exit code."""
+    """Run `cell` while holding its lock, unless another process has finished it; return the exit code."""
     before = CellRecord.read(folder)
     if before is not None and before.status == DONE:
         return EXIT_DONE
@@ -58,7 +58,7 @@ def run_locked(cell: Cell, folder: Path, *, retry: bool) -> int:
     import_modules([])
     resolved = resolve_cell(cell)
     if before is not None and (different := differences(before.config, resolved.config)):
-        print(f"another configuration: {'; '.join(different)}", file=sys.stderr)
+        print(f"the stored configuration differs: {'; '.join(different)}", file=sys.stderr)
         return EXIT_REFUSED
     remove_partial_files(folder)
     pin_threads()
@@ -68,7 +68,7 @@ def run_locked(cell: Cell, folder: Path, *, retry: bool) -> int:
 
 
 def describe(resolved: ResolvedCell, before: CellRecord | None) -> CellRecord:
-    """Return the record of a cell that runs now; `before` is what an interrupted run left."""
+    """Return the record of a running cell; `before` is the record of an interrupted run, if any."""
     cell, config = resolved.cell, resolved.config
     return CellRecord(
         task=cell.task,
@@ -87,9 +87,10 @@ def describe(resolved: ResolvedCell, before: CellRecord | None) -> CellRecord:
 
 
 def pin_threads() -> None:
-    """Pin torch to one thread, where a method has imported it; the other libraries read their environment variables.
+    """Pin torch to one thread if a method has imported it; other libraries read their environment variables.
 
-    Sums of floats depend on a library's threads. More cores are used side by side instead: see `Method.use_cores`.
+    Floating-point sums depend on a library's number of threads. Methods use more cores in another way: see
+    `Method.use_cores`.
     """
     if "torch" in sys.modules:
         sys.modules["torch"].set_num_threads(1)
@@ -113,7 +114,7 @@ def _run_and_record(resolved: ResolvedCell, folder: Path, record: CellRecord) ->
 
 
 def _end_with_parent() -> None:
-    """End this process at once when its standard input closes, which the system does when the parent dies."""
+    """End this process at once when its standard input closes; the system closes it when the parent dies."""
 
     def wait() -> None:
         while os.read(0, 4096):
@@ -124,8 +125,8 @@ def _end_with_parent() -> None:
 
 
 def start() -> None:
-    """Run `main` as a process of its own."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+    """Run `main` as a separate process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; the parent handles it
     faulthandler.enable()
     _end_with_parent()
     code = main()

@@ -1,4 +1,4 @@
-"""Show how a sweep goes: a live table on a terminal, plain lines elsewhere."""
+"""Show the progress of a sweep: a live table on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ LINE_SECONDS = 10.0
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Where a sweep stands."""
+    """The progress of a sweep."""
 
     running: list[tuple[Cell, dict[str, Any]]]
     finished: int
     cells: int
     steps_per_second: float
     seconds_left: float | None
-    """None while no speed is known."""
+    """None while the speed is unknown."""
 
     def line(self) -> str:
-        """Return it as one line of text."""
+        """Return the progress as one line of text."""
         left = "time left unknown" if self.seconds_left is None else f"about {duration(self.seconds_left)} left"
         counts = f"{self.finished}/{self.cells} cells ended, {len(self.running)} running"
         return f"{counts}, {self.steps_per_second:,.0f} steps/s, {left}"
@@ -71,7 +71,7 @@ class ProgressDisplay:
         self._remaining.pop(cell, None)
 
     def snapshot(self) -> Snapshot:
-        """Return where the sweep stands now."""
+        """Return the current progress of the sweep."""
         remaining = dict(self._remaining)
         running = [(cell, found) for cell in remaining if (found := self._read(cell)) is not None]
         speed = sum(found["steps_per_second"] for _, found in running)

@@ -1,4 +1,4 @@
-"""Run a grid of cells: plan what is left to do, spread it over workers, report how it ended."""
+"""Run a grid of cells: plan the missing cells, distribute them over workers, report the outcomes."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ from codesign_bench.sweep.workers import BUSY, Job, Outcome
 
 EXIT_ALL_DONE, EXIT_SOME_FAILED = 0, 1
 MAX_BROKEN_POOLS = 10
-"""How often in a row the worker processes may die without a single cell ending."""
+"""How many times in a row the worker processes may die before any cell ends."""
 LOCK_POLL_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a sweep finds in its results folder."""
+    """The cells of a sweep by their state in the results folder."""
 
     done: list[Cell]
     failed: dict[Cell, str]
-    """Cells that failed earlier and are not tried again, with their message."""
+    """Cells that failed earlier and are not retried, with their error messages."""
     pending: list[ResolvedCell]
 
 
 def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = False) -> Plan:
-    """Sort `cells` by what is left to do in `out`, before anything runs.
+    """Sort `cells` into done, failed and pending ones in `out`, before anything runs.
 
     Raises:
-        UserError: a cell of another configuration, a damaged cell file or checkpoint.
+        UserError: a stored cell has another configuration, or a cell file or checkpoint is damaged.
     """
     plan = Plan([], {}, [])
     records = {resolved.cell: CellRecord.read(resolved.cell.folder(out)) for resolved in cells}
@@ -58,20 +58,22 @@ def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = 
         elif record is not None and record.failure is not None and not retry_failed:
             plan.failed[cell] = record.failure.message
         else:
-            check_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is refused here, not in the middle
+            check_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is reported here, not during the sweep
             plan.pending.append(resolved)
     return plan
 
 
 def split_cores(cores: int, cells: int, threads: int, jobs: int | None) -> tuple[int, str]:
-    """Return how many cells run at a time, and a line that says how the cores are split.
+    """Return how many cells run at a time, and a message on the split of the cores.
 
     Args:
+        cores: number of available cores.
+        cells: number of cells to run.
         threads: threads of one cell.
-        jobs: what the user asks for, or None; jobs x threads never exceeds the cores.
+        jobs: the requested number of cells at a time, or None; jobs x threads never exceeds the cores.
 
     Raises:
-        UserError: one cell has more threads than there are cores.
+        UserError: one cell needs more threads than there are cores.
     """
     if threads > cores:
         raise UserError(f"--set threads={threads}: there are only {cores} cores")
@@ -91,11 +93,11 @@ def run_sweep(
     backend: str = "loky",
     scheduler: str | None = None,
 ) -> int:
-    """Run every cell that `out` does not hold yet; return 0 if all are done in the end, 1 if some failed.
+    """Run every cell that is not done in `out`; return 0 if all are done at the end, 1 if some failed.
 
     Raises:
         UserError: bad input, found before anything runs.
-        KeyboardInterrupt: the user stopped the sweep; its processes are gone, the same call resumes it.
+        KeyboardInterrupt: the user stopped the sweep; its processes have ended, and the same call resumes it.
     """
     open_folder(out)
     plan = make_plan(cells, out, retry_failed=retry_failed)
@@ -103,7 +105,7 @@ def run_sweep(
     used_jobs, split = split_cores(available_cores(), len(plan.pending), threads, jobs)
     chosen = make_backend(backend, used_jobs, scheduler)
     say = printer(console)
-    say(f"{len(cells)} cells, {len(plan.done)} of them done before; results in {out}")
+    say(f"{len(cells)} cells, {len(plan.done)} of them already done; results in {out}")
     failures = dict(plan.failed)
     if plan.pending:
         say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
@@ -116,7 +118,7 @@ def run_sweep(
 
 
 def _run_queue(queue: list[Job], workers: Backend, display: ProgressDisplay) -> dict[Cell, str]:
-    """Run all jobs; cells that another sweep holds come last. Return the failures."""
+    """Run all jobs, those of cells that another sweep is running last; return the failures."""
     failures: dict[Cell, str] = {}
     waiting_told = False
     broken = 0
@@ -138,8 +140,8 @@ def _run_queue(queue: list[Job], workers: Backend, display: ProgressDisplay) -> 
         except WorkersDied as error:
             broken = 0 if ended else broken + 1
             if broken == MAX_BROKEN_POOLS:
-                raise RuntimeError("the worker processes keep dying") from error
-            display.say("a worker process died; its cells are started again from their checkpoints")
+                raise RuntimeError("worker processes died repeatedly before any cell ended") from error
+            display.say("a worker process died; unfinished cells resume from their checkpoints")
     return failures
 
 
@@ -179,7 +181,7 @@ def _refuse_without_pretrained(cells: Sequence[Cell], out: Path) -> None:
             record = CellRecord.read(before.folder(out))
             if record is None or record.status != DONE:
                 raise UserError(
-                    f"{cell.name} starts from {before.name}, which is not done in {out}\nrun it first: "
+                    f"{cell.name} starts from {before.name}, which is not done in {out}\nfirst run: "
                     f"codesign-bench run --method {cell.method} --task {cell.task} --seeds {cell.seed}-{cell.seed} "
                     f"--profile {cell.profile} --out {out}, with the same --set if any"
                 )
@@ -191,8 +193,8 @@ def _conclude(say: Log, cells: int, failures: dict[Cell, str], earlier: dict[Cel
     if not failures:
         say(f"all {cells} cells done")
         return EXIT_ALL_DONE
-    hint = "; --retry-failed tries them again" if failures else ""
-    say(f"{len(failures)} of {cells} cells failed; their cell.json holds the traceback{hint}")
+    hint = "; --retry-failed runs them again" if failures else ""
+    say(f"{len(failures)} of {cells} cells failed; each cell.json has the traceback{hint}")
     return EXIT_SOME_FAILED
 
 

@@ -1,6 +1,6 @@
-"""Run one cell to its end in this process: train, evaluate at the marks, checkpoint, write the results.
+"""Run one cell to its end in this process: train, evaluate at the marks, save checkpoints, write the results.
 
-A cell that was interrupted goes on from its checkpoint; its curve is then the undisturbed one, `wall_s` aside.
+An interrupted cell resumes from its checkpoint, with the same curve as without the interruption, except for `wall_s`.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ from codesign_bench.storage.policies import policy_tensors, save_policy
 from codesign_bench.storage.records import Timings
 
 CHECKPOINT_SECONDS_VARIABLE = "CODESIGN_BENCH_CHECKPOINT_SECONDS"
-"""Environment variable: seconds between checkpoints (0 is after every batch); evaluations always make one."""
+"""Environment variable: seconds between checkpoints (0: after every batch); every evaluation also saves one."""
 CHECKPOINT_SECONDS = 20.0
 PAUSE_PER_SAVE = 20.0
-"""A checkpoint that took long to write is followed by a pause this many times as long: saving takes a twentieth of the
-time at most, evaluations aside, whatever the size of the method's state."""
+"""The pause after a checkpoint is at least this many times as long as writing it took. Saving thus takes at most a
+twentieth of the time, apart from evaluations, for any size of a method's state."""
 PROGRESS_SECONDS = 1.0
 
 
 class CellRun:
-    """One cell on its way; `finish` runs what is left of it."""
+    """The run of one cell; `finish` runs the rest of it."""
 
     def __init__(self, resolved: ResolvedCell, folder: Path) -> None:
         cell, config = self.cell, self.config = resolved.cell, resolved.config
@@ -65,7 +65,7 @@ class CellRun:
         self._last_evaluation: Evaluation | None = None
 
     def finish(self) -> None:
-        """Train to the end of the budget and write everything but the cell file."""
+        """Train to the end of the budget and write all files except the cell file."""
         steps = self.config.run.steps
         self._report("training")
         if self.progress.next_mark == 0:
@@ -80,7 +80,7 @@ class CellRun:
         self._write_final()
 
     def timings(self) -> Timings:
-        """Return seconds of training, of evaluation, and altogether, interruptions left out."""
+        """Return the seconds of training, of evaluation, and in total, without interruptions."""
         progress = self.progress
         return Timings(train_s=progress.train_s, evaluate_s=progress.evaluate_s, wall_s=self._wall_s())
 
@@ -101,7 +101,7 @@ class CellRun:
             total[1] += 1.0
 
     def _evaluate(self) -> None:
-        """Add a row to the curve and save; at most one row even when a batch passes several marks."""
+        """Add a row to the curve and save a checkpoint; a batch that passes several marks adds only one row."""
         self._report("evaluating")
         start = time.monotonic()
         evaluation = self._last_evaluation = self._judge()
@@ -132,7 +132,7 @@ class CellRun:
         return evaluate(problem.task, policy, problem.tradeoff, instances, problem.simulators)
 
     def _mark(self, index: int) -> int:
-        """Return the environment steps at which evaluation `index` is due; 0 and the whole budget are marks."""
+        """Return the environment steps at which evaluation `index` is due: the first at 0, the last at the budget."""
         return round(index * self.config.run.steps / self.config.run.evaluations)
 
     def _save(self) -> None:
@@ -144,7 +144,7 @@ class CellRun:
         self._save_s = self._saved - start
 
     def _pause(self) -> float:
-        """Return how long to train between two checkpoints, s."""
+        """Return the minimum time between two checkpoints, s."""
         return max(self._interval, PAUSE_PER_SAVE * self._save_s) if self._interval else 0.0
 
     def _wall_s(self) -> float:
@@ -157,14 +157,14 @@ class CellRun:
 
     def _write_final(self) -> None:
         policy, task = self.method.policy(), self.problem.task
-        # A cell killed after its last checkpoint comes here with no evaluation at hand.
+        # A cell that was killed after its last checkpoint resumes here, without an evaluation in memory.
         evaluation = self._last_evaluation or self._judge()
         self._write_curve()
         write_rows(self.folder / EVALUATION_FILE, list(rows(task, evaluation, self.problem.cutout)))
         save_policy(self.folder, policy, {"task": self.cell.task, "method": self.cell.method})
 
     def _report(self, phase: str) -> None:
-        """Tell whoever watches the folder where this cell stands, about once a second."""
+        """Write this cell's progress to its folder, about once a second."""
         now = time.monotonic()
         if now - self._reported < PROGRESS_SECONDS:
             return
@@ -184,5 +184,5 @@ class CellRun:
 
 
 def _results(cell: Cell, folder: Path) -> Path:
-    """Return the results folder below which `folder` holds the results of `cell`."""
+    """Return the results folder that contains `folder`, the folder of `cell`."""
     return folder.parents[len(Path(cell.name).parts) - 1]

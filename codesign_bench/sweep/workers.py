@@ -1,4 +1,4 @@
-"""What a joblib worker does: run one cell in a fresh process and say how it ended."""
+"""The work of a joblib worker: run one cell in a new process and return its outcome."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ START = (
     "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); "
     "from codesign_bench.sweep.cell_process import start; start()"
 )
-"""Starts a cell's process with this process's module path, whatever folder it is started in."""
+"""Starts a cell's process with this process's module path, independent of the working folder."""
 SETTLE_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
 class Job:
-    """One cell and how to run it; plain values, so that it travels to a worker."""
+    """One cell and how to run it, as plain values that can be sent to a worker."""
 
     cell: Cell
     out: str
     retry_failed: bool
     imported: str
-    """Modules of `--import`, as the environment variable names them; a worker elsewhere has another environment."""
+    """Modules of `--import`, as in the environment variable, which a worker on another machine does not have."""
 
 
 @dataclass(frozen=True)
@@ -49,11 +49,11 @@ class Outcome:
     cell: Cell
     status: str
     message: str = ""
-    """One line about a failure."""
+    """The error in one line."""
 
 
 def prepare_worker(main_pid: int) -> None:
-    """Make this joblib worker ignore Ctrl-C, which the main process handles, and end when the main process does."""
+    """Make this joblib worker ignore Ctrl-C, which the main process handles, and end with the main process."""
     if os.getpid() == main_pid:
         return
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -61,7 +61,7 @@ def prepare_worker(main_pid: int) -> None:
 
 
 def run_job(job: Job) -> Outcome:
-    """Run the job's cell in a process of its own and return how it ended; a dead process is recorded as a failure."""
+    """Run the job's cell in a separate process and return its outcome; a dead process is recorded as a failure."""
     folder = job.cell.folder(Path(job.out))
     folder.mkdir(parents=True, exist_ok=True)
     if is_locked(folder):
@@ -84,7 +84,7 @@ def _run_process(job: Job, folder: Path) -> int:
     with open(folder / LOG_FILE, "wb") as log:
         process = subprocess.Popen(
             [*command, *(["retry"] if job.retry_failed else [])],
-            stdin=subprocess.PIPE,  # never written to: its end tells the process that its parent is gone
+            stdin=subprocess.PIPE,  # never written to; it closes when the parent dies, which ends the process
             stdout=log,
             stderr=log,
             env={**thread_environment(), IMPORTS_VARIABLE: job.imported},
@@ -103,8 +103,8 @@ def _recorded_failure(folder: Path) -> str:
 
 
 def _record_death(folder: Path, code: int) -> str:
-    """Record the death of a cell's process and return its line; called once nobody else can be running the cell."""
-    # When a whole tree of processes is killed, this one goes next: then the cell is interrupted, not failed.
+    """Record that a cell's process died and return the message; called when no other process runs the cell."""
+    # If the whole process tree is being killed, this process also dies now: then the cell is interrupted, not failed.
     time.sleep(SETTLE_SECONDS)
     message = describe_exit(code)
     try:
@@ -121,7 +121,7 @@ def _record_death(folder: Path, code: int) -> str:
 
 
 def describe_exit(code: int) -> str:
-    """Say in words how a process ended that recorded no outcome."""
+    """Describe in words how a process ended that recorded no outcome."""
     if code >= 0:
         return f"the cell's process ended with exit code {code} and recorded nothing"
     try:

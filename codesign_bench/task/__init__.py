@@ -1,8 +1,8 @@
-"""What a task is, and what it is made of; everything that a new task needs is imported from here.
+"""The interface of a task; a new task imports everything it needs from here.
 
-`spaces.py` names and bounds, `tool.py` what tools are made of, `simulator.py` the physics, `behaviour.py` what acts,
-`task.py` the task itself, `loading.py` tasks by name, `episodes.py` the two-phase episode, `envs.py` Gymnasium's view
-of it, `robot.py` what deployment on an arm asks of a task.
+`spaces.py` has names and bounds, `tool.py` the shapes of tools, `simulator.py` the physics, `behaviour.py` designers
+and controllers, `task.py` the task itself, `loading.py` tasks by name, `episodes.py` the two-phase episode, `envs.py`
+Gymnasium environments, `robot.py` what a task must define to be deployed on an arm.
 """
 
 from codesign_bench.task.behaviour import Behaviour

@@ -1,4 +1,4 @@
-"""What acts in an episode: a designer and a controller.
+"""The interface of everything that acts in an episode: a designer and a controller.
 
 Shapes: `B` batch, `O` observation, `D` design, `C` control.
 """
@@ -11,7 +11,7 @@ from codesign_bench.task.spaces import Singles
 
 
 class Behaviour(ABC):
-    """A designer and a controller as functions of the observation: a task's script, or a trained policy."""
+    """A designer and a controller as functions of the observation: a task's script or a trained policy."""
 
     @abstractmethod
     def design(self, observation: Singles) -> Singles:

@@ -1,4 +1,4 @@
-"""Behaviours that nobody trained: designs given beforehand, random ones, and none at all.
+"""Behaviours without training: fixed designs, random tools and controls, and an idle tool.
 
 Shapes: `B` batch, `O` observation, `D` design, `C` control.
 """
@@ -13,14 +13,14 @@ from codesign_bench.task.task import Task
 
 
 class GivenDesigns(Behaviour):
-    """A controller with designs given beforehand: one per episode, or the same for all."""
+    """A controller with fixed designs: one per episode, or the same for all."""
 
     def __init__(self, unit_designs: Floats, controller: Behaviour) -> None:
-        """Take (B, D) designs for episodes played side by side, or one design (D,) for any number, in [-1, 1]."""
+        """Take designs in [-1, 1]: (B, D) for B parallel episodes, or one design (D,) for any number of episodes."""
         self.unit_designs, self.controller = unit_designs.astype(np.float32), controller
 
     def design(self, observation: Singles) -> Singles:
-        """Return the given designs (B, D), whatever the observation."""
+        """Return the fixed designs (B, D); the observation is ignored."""
         return np.broadcast_to(self.unit_designs, (*observation.shape[:-1], self.unit_designs.shape[-1]))
 
     def act(self, observation: Singles) -> Singles:
@@ -29,7 +29,7 @@ class GivenDesigns(Behaviour):
 
 
 class Idle(Behaviour):
-    """The tool in the middle of the design space, held still."""
+    """The tool at the centre of the design space, held still."""
 
     def __init__(self, task: Task) -> None:
         self.sizes = task.design_space.size, task.control_space.size
@@ -44,7 +44,7 @@ class Idle(Behaviour):
 
 
 class RandomBehaviour(Behaviour):
-    """Uniformly random tools, and controls that are drawn anew every few steps, so that tools travel."""
+    """Uniformly random tools, with random controls that are held for a few steps so that the tool covers distance."""
 
     HELD_STEPS = 10
 
@@ -58,7 +58,7 @@ class RandomBehaviour(Behaviour):
         return self._uniform(observation, self.task.design_space.size)
 
     def act(self, observation: Singles) -> Singles:
-        """Return random controls, the same for a while."""
+        """Return random controls, redrawn every `HELD_STEPS` steps."""
         if self._steps % self.HELD_STEPS == 0 or len(self._control) != len(observation):
             self._control = self._uniform(observation, self.task.control_space.size)
         self._steps += 1

@@ -1,7 +1,7 @@
-"""Gymnasium environments over the two-phase episode, single and batched: `codesign_bench/Push-v0` and its like.
+"""Gymnasium environments of the two-phase episode, single and batched, e.g. `codesign_bench/Push-v0`.
 
-Shapes: `B` environments, `O` observation, `D` design, `C` control, `I` instance. Listing the environments imports no
-task; a task is loaded when one is made.
+Shapes: `B` environments, `O` observation, `D` design, `C` control, `I` instance. Registering environments imports no
+task; a task is loaded when its environment is made.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def environment_id(task_name: str) -> str:
 
 
 def register_environments() -> None:
-    """Register an environment for every known task, third-party ones included; those already there stay."""
+    """Register an environment for every task, third-party ones included; existing registrations are kept."""
     for name in task_names():
         if environment_id(name) not in gymnasium.registry:
             gymnasium.register(
@@ -59,13 +59,13 @@ def observation_space(task: Task) -> Box:
 
 
 def _rendering(task: Task, rollouts: _Rollouts) -> dict[str, Any]:
-    """Return what an environment's metadata say of its pictures: those of a task that draws none offer no mode."""
+    """Return the metadata on rendering; a task that draws no pictures has no render mode."""
     modes = [RGB_ARRAY] if rollouts.episodes.simulator.draws else []
     return {"render_modes": modes, "render_fps": round(1.0 / task.control_period)}
 
 
 class _Rollouts:
-    """The episodes of `B` environments, each with its own generator of instances, that may be in different phases."""
+    """The episodes of `B` environments, which may be in different phases."""
 
     def __init__(self, task: Task, num_slots: int, tradeoff: Tradeoff | None) -> None:
         self.task = task
@@ -73,7 +73,7 @@ class _Rollouts:
         self.designing: Booleans = np.zeros(num_slots, dtype=bool)
         """(B,) whether the next step is the design step."""
         self.ended: Booleans = np.ones(num_slots, dtype=bool)
-        """(B,) whether the episode is over, or never began."""
+        """(B,) whether the episode has ended or was never started."""
         self.controlled: Booleans = np.zeros(num_slots, dtype=bool)
         """(B,) whether the last step was a control step."""
 
@@ -90,7 +90,7 @@ class _Rollouts:
             reward, terminated and truncated, each (b,).
         """
         if self.ended[slots].any():
-            raise gymnasium.error.ResetNeeded("an episode has ended, or never began: call reset() before step()")
+            raise gymnasium.error.ResetNeeded("an episode has ended or was never started: call reset() before step()")
         reward = np.zeros(len(slots))
         terminated, truncated = np.zeros(len(slots), dtype=bool), np.zeros(len(slots), dtype=bool)
         size = self.task.design_space.size
@@ -107,32 +107,32 @@ class _Rollouts:
         return reward, terminated, truncated
 
     def sample(self, slot_generators: Sequence[np.random.Generator]) -> Floats:
-        """Return (b, I) instances, one from each generator: an environment's instances do not depend on the others."""
+        """Return (b, I) instances, one per generator: an environment's instances do not depend on the others."""
         return np.concatenate([self.task.sample_instances(rng, 1) for rng in slot_generators])
 
 
 class ToolEnv(gymnasium.Env[Any, Any]):
-    """One two-phase episode at a time: the first step builds the tool, the others use it.
+    """One two-phase episode at a time: the first step builds the tool, all later steps use it.
 
     Action space
-        One box [design | control] in [-1, 1]. The first step reads the design part alone, later ones the control part.
+        One box [design | control] in [-1, 1]. The first step reads only the design part, later ones only the control.
 
     Observation
-        [state | goal | design | phase] as the task's docstring says; design and phase have no unit. The design is
+        [state | goal | design | phase], as in the task's docstring; design and phase have no unit. The design is
         zero before the first step; the phase is (design phase?, control phase?, elapsed fraction of the horizon).
 
     Reward
-        0 for the design step, then the task's reward, plus the trade-off reward (equation 1 of the paper) if asked for.
+        0 for the design step, then the task's reward, plus the trade-off reward (equation 1 of the paper) if requested.
 
     Starting state
         An instance of the task from the environment's generator, or `reset(options={"instance": (I,) array})`.
 
     Episode end
-        Terminated by success or failure, truncated at the time limit; `info["success"]` on the last step tells which.
+        Terminated by success or failure, truncated at the time limit; the last step has `info["success"]`.
 
     Info
-        `info["reward_terms"]` on control steps: what this step's reward is the sum of, name -> value, with the names of
-        `Task.reward_terms` (one term, `task`, where a task names none) and `tradeoff`.
+        `info["reward_terms"]` on control steps: name -> value of the terms that add up to this step's reward. The names
+        are those of `Task.reward_terms` (a single term, `task`, if the task names none) and `tradeoff`.
     """
 
     metadata: dict[str, Any] = {"render_modes": [RGB_ARRAY]}  # noqa: RUF012 - Gymnasium reads it from the class
@@ -149,7 +149,7 @@ class ToolEnv(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Singles, dict[str, Any]]:
-        """Begin an episode; `seed` restarts the generator of instances."""
+        """Begin an episode; `seed` reseeds the generator of instances."""
         super().reset(seed=seed)
         given = (options or {}).get("instance")
         instances = self._rollouts.sample([self.np_random]) if given is None else _given(given, self.task, 1)
@@ -185,12 +185,12 @@ class ToolEnv(gymnasium.Env[Any, Any]):
 
 
 class ToolVectorEnv(VectorEnv[Any, Any, Any]):
-    """`num_envs` environments like `ToolEnv` in one process and one batched simulator, the one that methods train on.
+    """`num_envs` environments like `ToolEnv` in one process, on the same batched simulator that methods train on.
 
-    The step after an episode's last begins the next one (Gymnasium's NEXT_STEP): it ignores the action and has reward
-    0. Infos are Gymnasium's: `info["success"]` (B,) holds where `info["_success"]` (B,) is true, which is on last
-    steps; each term of `info["reward_terms"]` (B,) where `info["_reward_terms"]` is, which is on control steps.
-    Environment `i` of `reset(seed=s)` goes as `ToolEnv` does after `reset(seed=s + i)`.
+    The step after an episode's last step begins the next episode (Gymnasium's NEXT_STEP): it ignores the action and has
+    reward 0. Infos follow Gymnasium: `info["success"]` (B,) is valid where `info["_success"]` (B,) is true, on last
+    steps; each term of `info["reward_terms"]` (B,) where `info["_reward_terms"]` is true, on control steps.
+    Environment `i` of `reset(seed=s)` plays the same episodes as `ToolEnv` after `reset(seed=s + i)`.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium reads it from the class
@@ -218,7 +218,7 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
         """Begin an episode in every environment, or in those of `options["reset_mask"]` (B,).
 
         Args:
-            seed: restarts the generators of instances: environment `i` gets `seed + i`, or `seed[i]` (None: goes on).
+            seed: reseeds the generators of instances: environment `i` gets `seed + i`, or `seed[i]` (None: unchanged).
             options: may hold `instance`, (I,) for all or (B, I), and `reset_mask`.
         """
         chosen = options or {}
@@ -234,7 +234,7 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
         return self._rollouts.episodes.observation.copy(), {}
 
     def step(self, actions: Singles) -> tuple[Singles, Floats, Booleans, Booleans, dict[str, Any]]:
-        """Step every environment with `actions` (B, D + C); those that ended begin anew instead.
+        """Step every environment with `actions` (B, D + C); those whose episode has ended begin the next one instead.
 
         Returns:
             observation (B, O), reward, terminated and truncated, each (B,), and info.
@@ -268,7 +268,7 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
         return seed
 
     def _info(self) -> dict[str, Any]:
-        """Return what `ToolEnv` does for each environment, merged as `VectorEnv` does it: masks have a `_`."""
+        """Return the infos of `ToolEnv`, merged as `VectorEnv` merges them: masks have the prefix `_`."""
         episodes, info = self._rollouts.episodes, dict[str, Any]()
         controlled, ended = self._rollouts.controlled, self._rollouts.ended
         if controlled.any():

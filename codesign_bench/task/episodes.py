@@ -1,6 +1,6 @@
-"""The two-phase episode over any simulator: one design step, then control until success or the time limit.
+"""The two-phase episode on any simulator: one design step, then control until success, failure or the time limit.
 
-Shapes: `B` slots, `b` the slots a call names, `O` observation, `D` design, `C` control, `I` instance.
+Shapes: `B` slots, `b` the slots of a call, `O` observation, `D` design, `C` control, `I` instance.
 """
 
 from __future__ import annotations
@@ -14,30 +14,32 @@ from codesign_bench.task.spaces import Booleans, Floats, Singles, Slots
 from codesign_bench.task.task import Task
 
 TRADEOFF_TERM, TASK_TERM = "tradeoff", "task"
-"""Names, among the terms of a reward, of the trade-off's share and of a task's own reward if it names no terms."""
+"""Names of reward terms: the trade-off reward, and the task's reward if the task names no terms."""
 
 
 @dataclass(frozen=True)
 class Tradeoff:
-    """The auxiliary reward of equation 1; `alpha` weighs material against control effort, `scale` is the paper's K."""
+    """The auxiliary reward of equation 1; `alpha` weights material against control effort, `scale` is the paper's K."""
 
     alpha: float
     scale: float
 
     def reward(self, material: Floats, effort: Floats) -> Floats:
         """Return K [1 - (alpha d_used/d_max + (1 - alpha) c_used/c_max)] for (b,) fractions in [0, 1]."""
+        # Both fractions are relative to the task's maximum. So alpha weights comparable numbers, and the reward is
+        # between 0 and K on every task. As it is a bonus, not a cost, ending an episode early by failure gains nothing.
         return self.scale * (1.0 - (self.alpha * material + (1.0 - self.alpha) * effort))
 
 
 def portions(count: int, task: Task) -> list[Slots]:
-    """Return the numbers below `count` in as few near-equal portions as the task's simulators may have slots for."""
+    """Split 0 ... `count` - 1 into the fewest near-equal portions that fit in `max_slots` of the task."""
     return list(np.array_split(np.arange(count), -(-count // task.max_slots)))
 
 
 class Episodes:
     """Runs independent two-phase episodes, one per slot, and keeps their observations (B, O) in one array.
 
-    An episode in a slot goes `begin`, `design`, then `control` until it is terminated or truncated. The design step
+    The calls of an episode are `begin`, `design`, then `control` until it is terminated or truncated. The design step
     counts as an environment step and has reward 0.
     """
 
@@ -49,14 +51,14 @@ class Episodes:
         self.layout = task.layout
         self.simulator = task.make_simulator(num_slots) if simulator is None else simulator
         self.num_slots = num_slots = self.simulator.num_slots
-        """B: as many as asked for, or more where a wider simulator was handed in."""
+        """B: the requested number, or more if a wider simulator was passed in."""
         self.observation: Singles = np.zeros((num_slots, self.layout.size), dtype=np.float32)
         self.elapsed = np.zeros(num_slots, dtype=np.intp)
         """(B,) control steps since the design step."""
         self.designs: Floats = np.zeros((num_slots, task.design_space.size))
         """(B, D) designs of the tools, in the design space's units."""
         self.reward_terms: dict[str, Floats] = {}
-        """Name -> (B,): what the last control step's reward is the sum of; empty before any control step."""
+        """Name -> (B,): the terms that add up to the last control step's reward; empty before any control step."""
         self._material = np.zeros(num_slots)
         space = task.state_space
         self._state_low, self._state_high = np.array(space.low, np.float32), np.array(space.high, np.float32)
@@ -71,9 +73,9 @@ class Episodes:
         self._observe(slots)
 
     def design(self, slots: Slots, unit_designs: Floats) -> None:
-        """Take the design step with `unit_designs` (b, D), normalised, which are clipped to [-1, 1].
+        """Take the design step with normalised `unit_designs` (b, D), clipped to [-1, 1].
 
-        Here, and nowhere else, a normalised design becomes one in the design space's units, which `designs` then holds.
+        This is the only place where a normalised design is converted to physical units; the result is in `designs`.
 
         Raises:
             ValueError: a design is not finite.
@@ -82,6 +84,7 @@ class Episodes:
         designs = self.designs[slots] = self.task.design_space.from_unit(clipped)
         self.simulator.build(slots, designs)
         if self.tradeoff is not None:
+            # Equation 1 charges the material at every control step, although the design fixes it once.
             self._material[slots] = self.task.material(designs)
         self.observation[slots, self.layout.design] = clipped
         self.observation[slots, self.layout.phase] = (0.0, 1.0, 0.0)
@@ -109,15 +112,17 @@ class Episodes:
         self.observation[slots, self.layout.phase.stop - 1] = self.elapsed[slots] / self.task.horizon
         self._observe(slots)
         terminated = simulator.success[slots] | simulator.failure[slots]
+        # Success on the last step counts as success: truncation would let a learner bootstrap beyond it.
         truncated = (self.elapsed[slots] >= self.task.horizon) & ~terminated
         return reward, terminated, truncated
 
     def success(self, slots: Slots) -> Booleans:
-        """Return which of `slots` (b,) hold a solved episode."""
+        """Return which episodes in `slots` (b,) are solved."""
         return self.simulator.success[slots]
 
     def _observe(self, slots: Slots) -> None:
         state = self.simulator.state[slots]
+        # A body that is flung out of the scene must not hand the networks values far outside the bounds of the spaces.
         self.observation[slots, self.layout.state] = np.clip(state, self._state_low, self._state_high)
 
 
@@ -126,4 +131,5 @@ def _finite(values: Floats, what: str) -> Floats:
     if bad.any():
         row = int(np.flatnonzero(bad.any(axis=-1))[0])
         raise ValueError(f"{bad.sum()} values of the {what} are not finite, the first in row {row}: {values[row]}")
+    # Checked before clipping, which would turn an infinity into a valid action and hide a diverged network.
     return np.clip(values, -1.0, 1.0).astype(np.float64, copy=False)

@@ -19,10 +19,10 @@ def deployable_tasks() -> tuple[str, ...]:
 
 
 def deployment_of(task: Task) -> DeploymentSpec:
-    """Return how a task is deployed on an arm.
+    """Return the deployment of a task.
 
     Raises:
-        UserError: it cannot be.
+        UserError: the task has none.
     """
     if task.deployment is None:
         raise UserError(f"task '{task.name}' has no deployment; choose from: {', '.join(deployable_tasks())}")

@@ -1,4 +1,4 @@
-"""The loop that plays episodes, step by step: evaluation, pictures, export and deployment all use it.
+"""The loop that plays episodes step by step; evaluation, pictures, export and deployment all use it.
 
 Shapes: `B` slots, `b` the slots that take a step, `O` observation, `C` control, `I` instance.
 """
@@ -16,17 +16,17 @@ from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.spaces import Booleans, Floats, Singles, Slots
 
 Observe: TypeAlias = Callable[[Episodes, Slots], Singles]
-"""Returns what a behaviour sees (b, O) of the episodes in slots (b,)."""
+"""Returns the observations (b, O) that a behaviour gets in slots (b,)."""
 
 
 @dataclass(frozen=True)
 class Turn:
-    """One step of every episode that was still running: first the design step, then control steps."""
+    """One step of every running episode: the design step first, then control steps."""
 
     step: int
     """Control steps taken so far; 0 at the design step."""
     slots: Slots
-    """(b,) the slots that took the step."""
+    """(b,) slots that took the step."""
     controls: Floats
     """(b, C) in [-1, 1]; zero at the design step."""
     reward: Floats
@@ -38,13 +38,13 @@ class Turn:
 def play(episodes: Episodes, behaviour: Behaviour, instances: Floats, observe: Observe | None = None) -> Iterator[Turn]:
     """Play one episode of each of `instances` (B, I) in the first slots of `episodes`; yield after every step.
 
-    Whoever iterates may look at `episodes` between steps, and may stop before the end.
+    The caller may read `episodes` between steps and may stop iterating before the end.
 
     Args:
         episodes: has at least B slots.
         behaviour: designs and acts; its designs and controls are clipped to [-1, 1].
         instances: in the instance space's units.
-        observe: what `behaviour` sees when it acts; None: the observation itself.
+        observe: gives `behaviour` its observations in the control phase; None: the unchanged ones.
     """
     count, see = len(instances), observe or _as_it_is
     slots = np.arange(count)
@@ -63,15 +63,15 @@ def play(episodes: Episodes, behaviour: Behaviour, instances: Floats, observe: O
 
 
 def first_observations(episodes: Episodes, instances: Floats) -> Singles:
-    """Return what a designer sees (B, O) of `instances` (B, I); the episodes then stand in their design phase."""
+    """Return a designer's observations (B, O) of `instances` (B, I); leaves the episodes in their design phase."""
     episodes.begin(np.arange(len(instances)), instances)
     return episodes.observation[: len(instances)].copy()
 
 
 def designed(episodes: Episodes, behaviour: Behaviour, instances: Floats) -> Floats:
-    """Return the designs (B, D), in the design space's units, that `behaviour` makes for `instances` (B, I).
+    """Return the designs (B, D) of `behaviour` for `instances` (B, I), in the design space's units.
 
-    The episodes then stand right after their design step.
+    Leaves the episodes right after their design step.
     """
     next(play(episodes, behaviour, instances))
     return episodes.designs[: len(instances)].copy()

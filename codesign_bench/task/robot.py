@@ -1,4 +1,4 @@
-"""What deployment on a robot arm asks of a task: trials, a simulator with other physics, what happened to the arm.
+"""What a task defines to be deployed on a robot arm: trials, a simulator with an arm, and a report on the arm.
 
 Shapes: `T` tools, `R` rows and `C` columns of a grid, `I` instance.
 """
@@ -15,33 +15,33 @@ from codesign_bench.task.tool import ToolPart
 
 IDEAL, PANDA = "ideal", "panda"
 ARMS = (PANDA, IDEAL)
-"""The Franka Panda of the paper, or the gantry that policies are trained with."""
+"""The Franka Panda of the paper, and the gantry used in training."""
 
 
 @dataclass
 class ArmReport:
-    """What happened to the arm in one episode; steps are control steps, and one may count for several things."""
+    """Events of the arm in one episode, in control steps; one step may count for several events."""
 
     unreachable_steps: int = 0
-    """The commanded pose could not be reached within the joints' limits; the arm went as near as it could."""
+    """The commanded pose was out of reach within the joint limits; the arm moved as near to it as possible."""
     joint_limit_steps: int = 0
-    """A joint stood at the end of its range."""
+    """A joint was at the end of its range."""
     velocity_limit_steps: int = 0
-    """A joint would have had to move faster than it can, so the arm lagged behind."""
+    """A joint's speed limit was exceeded by the command, so the arm lagged behind."""
     torque_limit_steps: int = 0
-    """A joint would have needed more torque than it has."""
+    """A joint needed more torque than its limit."""
     self_collision_steps: int = 0
-    """The arm ran into itself or into the tool."""
+    """The arm collided with itself or with the tool."""
     scene_contact_steps: int = 0
-    """The arm, its tool excepted, touched something fixed: table or overhang."""
+    """The arm (not the tool) touched something fixed: table or overhang."""
     object_contact_steps: int = 0
-    """The arm, its tool excepted, touched a loose body, as when fingers push the cube."""
+    """The arm (not the tool) touched a loose body, e.g. the fingers pushed the cube."""
     tracking_error_sum: float = 0.0
-    """Of the distances between commanded and reached held point at the end of control steps, m."""
+    """Sum over control steps of the distance between commanded and reached held point at the step's end, m."""
     tracking_error_max: float = 0.0
-    """The largest of them, m."""
+    """The largest of these distances, m."""
     steps: int = 0
-    """Control steps counted."""
+    """Number of control steps."""
 
     @property
     def tracking_error_mean(self) -> float:
@@ -51,24 +51,24 @@ class ArmReport:
 
 @dataclass(frozen=True)
 class RobotTrials:
-    """The trials of a task's tools on a robot, in the task's own frame."""
+    """The trials of a task's tools on a robot, in the task's frame."""
 
     own: Floats
-    """(T, I): what each of T tools is designed for."""
+    """(T, I): the instance that each of T tools is designed for."""
     grid: Floats
-    """(R, C, I): on which every tool is tried, the row that is farthest from the robot first; R is 0 without a grid."""
+    """(R, C, I): instances for every tool, the row farthest from the robot first; R is 0 without a grid."""
     success_outcome: float
     """The task's outcome at which an episode succeeds, in the outcome's unit."""
     near_miss: float
-    """A failure whose outcome is this near to success counts as nearly solved, in the outcome's unit."""
+    """A failure within this distance of success counts as a near miss, in the outcome's unit."""
     trials_per_tool: int
-    """Trials with each tool on its own instance."""
+    """Trials of each tool on its own instance."""
     max_steps: int
     """Control steps until a trial ends without success."""
 
 
 class DeployedSimulator(Simulator):
-    """A simulator whose robot and physics can differ from those of training."""
+    """A simulator whose robot and physics may differ from training."""
 
     @abstractmethod
     def perturb(self, slot: int, friction: float, mass: float) -> None:
@@ -80,19 +80,19 @@ class DeployedSimulator(Simulator):
 
 
 def no_handle() -> tuple[ToolPart, ...]:
-    """Return no part: the tools have a handle among their own parts, or no gripper holds them."""
+    """Return no part: the tool's parts include a handle, or no gripper holds it."""
     return ()
 
 
 @dataclass(frozen=True)
 class DeploymentSpec:
-    """How a task's policies and tools are tried on a robot arm."""
+    """How the policies and tools of a task are tried on a robot arm."""
 
     trials: RobotTrials
     make_simulator: Callable[[int, str], DeployedSimulator]
-    """Returns a simulator with so many slots whose tools are held by an arm, one of `ARMS`."""
+    """Maps a number of slots and an arm, one of `ARMS`, to a simulator in which this arm holds the tools."""
     gripper_handle: Callable[[], tuple[ToolPart, ...]] = no_handle
-    """Returns what the gripper holds a printed tool by, beyond `Task.tool_parts`, in the frame of the held point.
+    """Returns the parts of a printed tool's handle, in addition to `Task.tool_parts`, in the frame of the held point.
 
-    The first part touches the tool's node 0, every other one the part before it.
+    The first part touches the tool's node 0, every later one the part before it.
     """

@@ -1,11 +1,11 @@
-"""The numbers that a scene is made of, with units and sources, spelled once where the scene's code uses them.
+"""The constants of a scene, with units and sources, defined once where the scene's code uses them.
 
-A module annotates its constants, and a docstring says what each of them is:
+A module annotates its constants, and a docstring describes each of them:
 
     PUCK_RADIUS: Annotated[float, Given("m", OURS)] = 1.0
     # its docstring follows
 
-`constants(__name__)` collects them, for pages, tables and tests that set what runs beside what is printed elsewhere.
+`constants(__name__)` collects them for documentation, tables and tests that compare them with published values.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from dataclasses import dataclass
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 OURS = "ours"
-"""The source of what nothing published prescribes."""
+"""The source of a value that no publication gives."""
 
 
 @dataclass(frozen=True)
 class Given:
-    """Where a constant comes from; stands in its annotation."""
+    """Unit and source of a constant; part of its annotation."""
 
     unit: str
-    """"1" for a number without one."""
+    """"1" for a number without a unit."""
     source: str
-    """Of the value that runs: `OURS`, or what prints it, e.g. "paper, table of push"."""
+    """Source of the value in use: `OURS`, or the publication, e.g. "paper, table of push"."""
     row: str = ""
-    """The row of a published table that it stands for, whether or not it has the printed value; empty: no row."""
+    """The row of a published table that the constant implements, with the printed value or another; empty: no row."""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """A number, or several, of a scene."""
+    """One or several numbers of a scene."""
 
     value: Any
     unit: str
@@ -42,7 +42,7 @@ class Constant:
 
 
 def constants(module_name: str) -> dict[str, Constant]:
-    """Return name -> constant for the names in a module that are annotated with `Given` so far, in their order."""
+    """Return name -> constant for all names of a module annotated with `Given` so far, in order of definition."""
     module = sys.modules[module_name]
     found = {}
     for name, hint in get_type_hints(module, include_extras=True).items():
@@ -53,15 +53,15 @@ def constants(module_name: str) -> dict[str, Constant]:
 
 
 def by_row(scene: Mapping[str, Constant]) -> dict[str, Constant]:
-    """Return the constants that stand for a row of a published table, by the name of the row.
+    """Return the constants that implement a row of a published table, by the name of the row.
 
     Raises:
-        ValueError: two stand for the same row.
+        ValueError: two constants have the same row.
     """
     rows: dict[str, Constant] = {}
     for name, constant in scene.items():
         if constant.row in rows:
-            raise ValueError(f"{name} is not the only constant for the row '{constant.row}'")
+            raise ValueError(f"{name} is the second constant for the row '{constant.row}'")
         if constant.row:
             rows[constant.row] = constant
     return rows

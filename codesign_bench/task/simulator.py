@@ -1,6 +1,6 @@
-"""A batched simulator of one task, and what it promises of its physics.
+"""A batched simulator of one task, and the guarantees of its physics.
 
-Shapes: `B` slots of a simulator, `b` the slots a call names, `I` instance, `S` state, `D` design, `C` control.
+Shapes: `B` slots of a simulator, `b` the slots of a call, `I` instance, `S` state, `D` design, `C` control.
 """
 
 from __future__ import annotations
@@ -18,42 +18,42 @@ from codesign_bench.task.tool import ToolPart
 
 @dataclass(frozen=True)
 class Physics:
-    """What a scene looks like to someone who checks its physics."""
+    """Measurements of a scene for a check of its physics."""
 
     overlap: float
-    """Deepest overlap of two bodies that should not overlap, m; 0 when none do."""
+    """Deepest overlap of two bodies that should not overlap, m; 0 if there is none."""
     speed: float
-    """Speed of the fastest body, the tool's excepted, m/s."""
+    """Speed of the fastest body other than the tool, m/s."""
     contained: bool
-    """Whether every body is on its side of every wall and floor (or lies where it could have fallen)."""
+    """Whether every body is on the correct side of every wall and floor (or where it could have fallen)."""
 
 
 @dataclass(frozen=True)
 class Soundness:
-    """What a task promises of its physics, for any design and any control; tests hold it to that."""
+    """Guarantees of a task's physics for any design and any control; tests check them."""
 
     overlap: float
     """No two bodies overlap deeper than this, m."""
     speed: float
-    """Nothing but the tool is ever faster than this, m/s."""
+    """No body other than the tool is faster than this, m/s."""
     outcome_change: float
     """Halving the physics step changes the outcome of a scripted episode by less than this, in the outcome's unit.
 
-    It holds for the median episode; where contact is chaotic, for the mean over instances, and a two-sample
-    Kolmogorov-Smirnov test finds no difference between the outcomes' distributions.
+    This holds for the median episode. Where contact is chaotic, it holds for the mean over instances instead, and a
+    two-sample Kolmogorov-Smirnov test finds no difference between the distributions of outcomes.
     """
     start_overlap: float = 1e-3
-    """Right after the design step, no design overlaps anything deeper than this, m."""
+    """Right after the design step, no tool overlaps anything deeper than this, m."""
     chaotic: bool = False
-    """Whether many bodies in contact make single episodes depend on the last bit."""
+    """Whether rounding errors decide single episodes, because many bodies are in contact."""
 
 
 class Simulator(ABC):
     """Many independent episodes of one task in one process; slot `i` holds one episode.
 
-    A call names the slots it means and touches no other. What happens in a slot depends on what was sent to that
-    slot since its `begin` alone, so an episode is the same alone and in any batch, in a new simulator and in one that
-    has played before: simulators are kept and used again.
+    A call changes only the slots that it is given. What happens in a slot depends only on the calls to this slot since
+    its `begin`. An episode is therefore the same in any batch, and in a new simulator or a used one: simulators are
+    reused.
     """
 
     def __init__(self, num_slots: int, state_size: int) -> None:
@@ -63,17 +63,17 @@ class Simulator(ABC):
         self.reward: Floats = np.zeros(num_slots)
         """(B,) reward of the last step."""
         self.reward_terms: dict[str, Floats] = {}
-        """Name -> (B,): what the last step's reward is the sum of, as far as the task names it."""
+        """Name -> (B,): the terms that add up to the last step's reward, if the task names terms."""
         self.conditions: dict[str, Booleans] = {}
-        """Name -> (B,): whether each condition of success holds now, as far as the task names them."""
+        """Name -> (B,): whether each condition of success holds now, if the task names conditions."""
         self.met_steps: Slots = np.zeros(num_slots, dtype=np.intp)
-        """(B,) control steps in a row, up to now, in which all conditions of success held."""
+        """(B,) number of consecutive control steps, up to now, in which all conditions of success held."""
         self.success: Booleans = np.zeros(num_slots, dtype=bool)
         """(B,) whether the task is solved; ends the episode."""
         self.failure: Booleans = np.zeros(num_slots, dtype=bool)
-        """(B,) whether the episode is lost for good (a cup that fell off the table); ends it, too."""
+        """(B,) whether the episode can no longer succeed (e.g. a cup fell off the table); ends the episode."""
         self.outcome: Floats = np.zeros(num_slots)
-        """(B,) the task's outcome quantity as it stands now; no part of the observation."""
+        """(B,) current value of the task's outcome; not part of the observation."""
 
     @abstractmethod
     def begin(self, slots: Slots, instances: Floats) -> None:
@@ -85,10 +85,10 @@ class Simulator(ABC):
 
     @abstractmethod
     def step(self, slots: Slots, controls: Floats) -> None:
-        """Advance `slots` by one control step with `controls` (b, C) in [-1, 1]; write state, reward and both ends."""
+        """Advance `slots` by a control step with `controls` (b, C) in [-1, 1]; set state, reward, success, failure."""
 
     def forget(self, slots: Slots) -> None:
-        """Forget the last episodes of `slots` (b,): rewards, conditions, ends and outcomes. For `begin`."""
+        """Clear rewards, conditions, success, failure and outcomes of `slots` (b,). For use in `begin`."""
         for values in (self.reward, self.outcome, *self.reward_terms.values()):
             values[slots] = 0.0
         for flags in (self.success, self.failure, *self.conditions.values()):
@@ -96,7 +96,7 @@ class Simulator(ABC):
         self.met_steps[slots] = 0
 
     def set_reward(self, slots: Slots, **terms: NDArray[np.floating[Any]] | float) -> None:
-        """Reward `slots` (b,) by the sum of named terms, (b,) each, added up in the order given. For `step`."""
+        """Set the reward of `slots` (b,) to the sum of named terms, (b,) each, in this order. For use in `step`."""
         total: NDArray[np.floating[Any]] | float = 0.0
         for index, (name, values) in enumerate(terms.items()):
             if name not in self.reward_terms:
@@ -106,12 +106,12 @@ class Simulator(ABC):
         self.reward[slots] = total
 
     def set_success(self, slots: Slots, steps: int = 1, **conditions: Booleans) -> None:
-        """Call `slots` (b,) solved once all named conditions, (b,) each, have held together for a while. For `step`.
+        """Mark `slots` (b,) as solved once all named conditions, (b,) each, have held long enough. For use in `step`.
 
         Args:
-            slots: which took a control step.
-            steps: control steps in a row for which the conditions must hold.
-            conditions: whether each holds now.
+            slots: slots that took a control step.
+            steps: consecutive control steps in which all conditions must hold.
+            conditions: whether each condition holds now.
         """
         met: Booleans = np.ones(len(slots), dtype=bool)
         for name, holds in conditions.items():
@@ -123,7 +123,7 @@ class Simulator(ABC):
         self.success[slots] = self.met_steps[slots] >= steps
 
     def advance(self, slots: Slots) -> None:
-        """Make the engine's own physics steps of one control step, and nothing else: the raw cost of a step.
+        """Take only the engine's physics steps of one control step, to measure the bare cost of a step.
 
         Raises:
             NotImplementedError: the task has no engine.
@@ -131,7 +131,7 @@ class Simulator(ABC):
         raise NotImplementedError
 
     def inspect(self, slot: int) -> Physics:
-        """Return what the scene in `slot` looks like to someone who checks its physics; changes nothing.
+        """Return measurements of the scene in `slot` for a check of its physics; changes nothing.
 
         Raises:
             NotImplementedError: the task does not say.
@@ -139,7 +139,7 @@ class Simulator(ABC):
         raise NotImplementedError
 
     def tool_shapes(self, slot: int) -> tuple[ToolPart, ...]:
-        """Return what the engine itself lets collide as the tool in `slot`, in the frame of the held point.
+        """Return the tool's collision shapes in the engine for `slot`, in the frame of the held point.
 
         Raises:
             NotImplementedError: the task does not say.

@@ -1,7 +1,7 @@
-"""Keep a task's simulator between batches and evaluations instead of making it anew.
+"""Reuse a task's simulator across batches and evaluations.
 
-Making a simulator may be slow (worlds, compiled kernels), and holding two may need too much memory (a 3D world takes
-28 MB). So training and evaluation share one: whoever needs it borrows it for as long as its episodes last.
+Making a simulator may be slow (worlds, compiled kernels), and two may need too much memory (a 3D world takes 28 MB).
+Training and evaluation therefore share one: each borrows it while its episodes run.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from codesign_bench.task.task import Task
 
 
 class Simulators:
-    """Lends simulators of one task; between loans it keeps a single one, the widest so far.
+    """Lends simulators of one task; between loans it keeps only the widest one so far.
 
-    A borrower gets at least as many slots as it asked for. That changes no episode: what happens in a slot depends only
-    on what was sent to it since its `begin`, whatever was played in it before.
+    A borrower gets at least the requested number of slots. Extra slots do not change an episode: what happens in a slot
+    depends only on the calls to it since its `begin`.
     """
 
     def __init__(self, task: Task) -> None:
@@ -26,19 +26,19 @@ class Simulators:
 
     @contextmanager
     def lend(self, num_slots: int) -> Iterator[Simulator]:
-        """Lend a simulator with at least `num_slots` slots, which must not be used after the `with` block.
+        """Lend a simulator with at least `num_slots` slots; it must not be used after the `with` block.
 
-        A second loan within the first gets another simulator.
+        A nested loan gets another simulator.
         """
         simulator = self._take(num_slots)
         yield simulator
-        self._keep(simulator)  # Not after an error, which may have left it half-way through a step.
+        self._keep(simulator)  # not after an error, which may leave it in the middle of a step
 
     def _take(self, num_slots: int) -> Simulator:
         idle, self._idle = self._idle, None
         if idle is not None and idle.num_slots >= num_slots:
             return idle
-        del idle  # Before the wider one is made: both together could be too much for the memory.
+        del idle  # freed before the wider one is made, because both may not fit in memory
         return self.task.make_simulator(num_slots)
 
     def _keep(self, simulator: Simulator) -> None:
@@ -46,5 +46,5 @@ class Simulators:
             self._idle = simulator
 
     def __reduce__(self) -> tuple[type[Simulators], tuple[Task]]:
-        """Pickle without the simulator: another process makes its own."""
+        """Pickle without the simulator; another process makes a new one."""
         return Simulators, (self.task,)

@@ -1,4 +1,4 @@
-"""Named, bounded spaces with units, the parts of an observation, and the names of array types.
+"""Named, bounded spaces with units, the parts of an observation, and array types.
 
 Shapes: `O` observation, `S` state, `G` goal, `D` design; `...` any leading axes.
 """
@@ -18,14 +18,14 @@ Slots = NDArray[np.intp]
 Frame = NDArray[np.uint8]
 """A picture, (height, width, 3), in RGB."""
 Span: TypeAlias = slice
-"""Where neighbouring entries of a space are found on the last axis of an array."""
+"""Positions of adjacent entries of a space on the last axis of an array."""
 
 
 @dataclass(frozen=True)
 class Box:
-    """A bounded space whose every entry has a name, a unit and a range in that unit.
+    """A bounded space; every entry has a name, a unit and a range in that unit.
 
-    Code refers to entries by name, so that their order is spelled once, where the space is defined:
+    Code refers to entries by name, so that only the definition of the space fixes their order:
 
         STATE = Box.of(puck_x=(-6.0, 30.0, "m"), puck_y=(-6.0, 30.0, "m"), distance=(0.0, 9.0, "m"))
         PUCK, DISTANCE = STATE.slice("puck_x", "puck_y"), STATE.index("distance")
@@ -65,29 +65,29 @@ class Box:
         return self.names.index(name)
 
     def slice(self, *names: str) -> Span:
-        """Return the positions of the entries `names`, which are neighbours in this order.
+        """Return the positions of the entries `names`, which must be adjacent and in this order.
 
         Raises:
-            ValueError: there is no such entry, or others are between them.
+            ValueError: an entry does not exist, or they are not adjacent.
         """
         positions = [self.index(name) for name in names]
         if not positions or positions != list(range(positions[0], positions[0] + len(positions))):
-            raise ValueError(f"not neighbours in this order: {', '.join(names) or 'no names'}")
+            raise ValueError(f"entries are not adjacent in this order: {', '.join(names) or 'no names'}")
         return slice(positions[0], positions[-1] + 1)
 
     def group(self, prefix: str) -> Span:
-        """Return the positions of all entries whose names start with `prefix`; they are neighbours.
+        """Return the positions of all entries whose names start with `prefix`; they must be adjacent.
 
         Raises:
-            ValueError: no entry's name does, or others are between them.
+            ValueError: no name starts with it, or the entries are not adjacent.
         """
         return self.slice(*(name for name in self.names if name.startswith(prefix)))
 
     def part(self, *names: str) -> Box:
-        """Return the space of the entries `names` alone, in this order.
+        """Return the space of only the entries `names`, in this order.
 
         Raises:
-            ValueError: there is no such entry.
+            ValueError: an entry does not exist.
         """
         chosen = [self.index(name) for name in names]
         return Box(
@@ -113,17 +113,17 @@ class Box:
         return 2.0 * (np.asarray(values, dtype=np.float64) - low) / (high - low) - 1.0
 
     def sample(self, rng: np.random.Generator, count: int) -> Floats:
-        """Return (count, size) points, uniform in the box, in the entries' units."""
+        """Return (count, size) points drawn uniformly from the box, in the entries' units."""
         return rng.uniform(*self.bounds, size=(count, self.size))
 
 
 class Observed(NamedTuple):
-    """The parts of one observation (O,), or of many (..., O); each part keeps the leading axes."""
+    """The parts of one observation (O,) or of many (..., O); each part keeps the leading axes."""
 
     state: NDArray[Any]
     """(..., S) in the state space's units."""
     goal: NDArray[Any]
-    """(..., G) in the goal space's units; an instance starts with the goal, so indices are the same."""
+    """(..., G) in the goal space's units; an instance starts with the goal, so its indices are the same."""
     design: NDArray[Any]
     """(..., D) in [-1, 1]."""
     phase: NDArray[Any]
@@ -132,7 +132,7 @@ class Observed(NamedTuple):
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each part of an observation is found: [state | goal | design | phase]."""
+    """Positions of the parts of an observation: [state | goal | design | phase]."""
 
     state: slice
     goal: slice
@@ -155,13 +155,13 @@ class Layout:
         return self.phase.stop
 
     def split(self, observation: NDArray[Any]) -> Observed:
-        """Return the parts of `observation` (..., O), as views of it: `split(seen).state[..., STATE.index("tilt")]`."""
+        """Return the parts of `observation` (..., O) as views: `split(seen).state[..., STATE.index("tilt")]`."""
         return Observed(*(observation[..., part] for part in (self.state, self.goal, self.design, self.phase)))
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a number of a task measures, and its unit."""
+    """A measured quantity of a task, and its unit."""
 
     name: str
     unit: str

@@ -1,4 +1,4 @@
-"""What a task is: spaces, instances, a batched simulator. It knows nothing of methods.
+"""The interface of a task: spaces, instances and a batched simulator. Tasks do not depend on methods.
 
 Shapes: `b` batch, `I` instance, `G` goal, `D` design, `C` control.
 A new task is one file in `tasks/` with one public subclass of `Task`.
@@ -24,7 +24,7 @@ from codesign_bench.task.tool import ToolGraph, ToolPart
 
 NOTHING_NAMED: Mapping[str, Any] = MappingProxyType({})
 EVALUATION_SEED = 20231106
-"""Seed of every task's fixed evaluation instances; training never uses it (ours)."""
+"""Seed of every task's fixed evaluation instances, never used in training (ours)."""
 
 
 ByProfile: TypeAlias = Mapping[str, Mapping[str, Any]]
@@ -38,9 +38,9 @@ class Task(ABC):
     """
 
     name: ClassVar[str]
-    """Its name, which is its file's name."""
+    """The task's name, which is also the name of its file."""
     title: ClassVar[str]
-    """Its name in figures."""
+    """The task's name in figures."""
     horizon: ClassVar[int]
     """Control steps until the time limit."""
     control_period: ClassVar[float]
@@ -49,38 +49,38 @@ class Task(ABC):
     tool_graph: ClassVar[ToolGraph]
     control_space: ClassVar[Box]
     instance_space: ClassVar[Box]
-    """All that differs between episodes: first the goal, then whatever the policies are not told as a goal."""
+    """Everything that varies between episodes: the goal, followed by hidden variation (not part of the goal)."""
     goal_size: ClassVar[int]
-    """How many leading entries of an instance are the goal."""
+    """Number of leading entries of an instance that are the goal."""
     position_entries: ClassVar[tuple[str, ...]] = ()
-    """Names of the one or two entries of an instance that are a position, along x and y; empty: none is.
+    """Names of the one or two entries of an instance that are a position, along x and y; empty: no position.
 
-    These are what a cutout region is cut out of, and what maps of instances show.
+    The cutout region is defined on these entries, and maps of instances show them.
     """
     state_space: ClassVar[Box]
     reward_terms: ClassVar[Mapping[str, str]] = NOTHING_NAMED
-    """Name -> formula, with units, of each term that `Simulator.set_reward` adds up; empty: the task names none."""
+    """Name -> formula, with units, of each term that `Simulator.set_reward` sums; empty: the task names none."""
     success_conditions: ClassVar[Mapping[str, str]] = NOTHING_NAMED
-    """Name -> words, with units, for each condition of `Simulator.set_success`; empty: the task names none."""
+    """Name -> description, with units, of each condition of `Simulator.set_success`; empty: the task names none."""
     success_steps: ClassVar[int] = 1
-    """Control steps in a row for which all of these conditions must hold."""
+    """Number of consecutive control steps in which all of these conditions must hold."""
     failure_condition: ClassVar[str] = ""
-    """When an episode is lost for good, in words with units; empty: never."""
+    """When an episode fails before the time limit, in words with units; empty: never."""
     scene: ClassVar[Mapping[str, Constant]] = NOTHING_NAMED
-    """Name -> number, with unit and source, of what the scene is made of: `constants(__name__)`."""
+    """Name -> constant of the scene, with unit and source: `constants(__name__)`."""
     outcome: ClassVar[Quantity | None] = None
-    """What `Simulator.outcome` measures: how far the task got, whatever the reward."""
+    """What `Simulator.outcome` measures: progress on the task, independent of the reward."""
     soundness: ClassVar[Soundness | None] = None
-    """What the task promises of its physics; built-in tasks all do."""
+    """Guarantees of the task's physics; all built-in tasks have them."""
     run_settings: ClassVar[ByProfile] = {}
-    """Profile -> run settings that this task wants otherwise, e.g. a larger budget."""
+    """Profile -> run settings that differ for this task, e.g. a larger budget."""
     num_evaluation_instances: ClassVar[int] = 128
     max_slots: ClassVar[int] = 1_000
-    """Most slots to ask of one simulator when many episodes are to be played; a world may need much memory."""
+    """Most slots to request of one simulator for many episodes, because a world may need much memory."""
 
     @property
     def goal_space(self) -> Box:
-        """The leading, visible part of the instance space."""
+        """The leading, observed part of the instance space."""
         return self.instance_space.part(*self.instance_space.names[: self.goal_size])
 
     @property
@@ -89,31 +89,31 @@ class Task(ABC):
         return Layout.of(self.state_space.size, self.goal_size, self.design_space.size)
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
-        """Return (count, I) random instances, uniform in the instance space unless a task says otherwise."""
+        """Return (count, I) random instances; by default uniform in the instance space."""
         return self.instance_space.sample(rng, count)
 
     def evaluation_instances(self) -> Floats:
-        """Return the (num_evaluation_instances, I) instances on which every method is judged, always the same."""
+        """Return the (num_evaluation_instances, I) fixed instances on which every method is evaluated."""
         return self.sample_instances(generator(EVALUATION_SEED, self.name), self.num_evaluation_instances)
 
     @property
     def position_index(self) -> list[int]:
-        """Where an instance holds its position, in the order of `position_entries`.
+        """Indices of the position in an instance, in the order of `position_entries`.
 
         Raises:
-            UserError: no entry is a position.
+            UserError: the task has no position.
         """
         if not self.position_entries:
             raise UserError(f"neither goals nor starts of task '{self.name}' are positions")
         return [self.instance_space.index(name) for name in self.position_entries]
 
     def in_region(self, instances: Floats) -> Booleans:
-        """Return which positions of instances (b, I) are in the training region, its border included.
+        """Return which positions of instances (b, I) are in the training region, including its border.
 
-        By default the region is everything between the bounds of `position_entries`.
+        By default the region is the box between the bounds of `position_entries`.
 
         Raises:
-            UserError: no entry is a position.
+            UserError: the task has no position.
         """
         index = self.position_index
         low, high = (bound[index] for bound in self.instance_space.bounds)
@@ -124,17 +124,17 @@ class Task(ABC):
         """Return which instances (b, I) are in the cutout region, `fraction` of the training region (section 5.2).
 
         Raises:
-            UserError: the task has no goal or start that is a position.
+            UserError: the task has no position.
         """
-        raise UserError(f"--cutout: neither goals nor starts of task '{self.name}' are positions")
+        raise UserError(f"--cutout needs a task whose goals or starts are positions; '{self.name}' has none")
 
     def fine_tuning_instances(self) -> Floats:
-        """Return the (b, I) instances outside the training region on which policies are tuned further (section 5.2).
+        """Return the (b, I) instances outside the training region on which policies are fine-tuned (section 5.2).
 
         Raises:
-            UserError: the task names none.
+            UserError: the task has none.
         """
-        raise UserError(f"task '{self.name}' names no instances for fine-tuning")
+        raise UserError(f"task '{self.name}' has no fine-tuning instances")
 
     @abstractmethod
     def material(self, designs: Floats) -> Floats:
@@ -145,23 +145,23 @@ class Task(ABC):
         """Return c_used / c_max in [0, 1] for controls (b, C) in [-1, 1] (equation 1)."""
 
     def tool_parts(self, design: Floats) -> tuple[ToolPart, ...]:
-        """Return what the tool of a design (D,), in the design space's units, is made of.
+        """Return the parts of the tool for a design (D,) in the design space's units.
 
-        These are the shapes that the simulator lets collide, in the order of the tool graph's nodes and of one kind;
+        These are the collision shapes of the simulator, in the order of the tool graph's nodes and all of one type;
         they may overlap.
 
         Raises:
-            UserError: the task does not say.
+            UserError: the task does not define them.
         """
-        raise UserError(f"task '{self.name}' does not say what its tools are made of")
+        raise UserError(f"task '{self.name}' does not define the parts of its tools")
 
     def script(self) -> Behaviour:
-        """Return a designer and a controller written by hand, for pictures and checks: functions of the observation.
+        """Return a hand-written designer and controller, functions of the observation, for pictures and checks.
 
-        The controller uses whatever tool it is given. Neither needs to solve every instance.
+        The controller must work with any tool. Neither needs to solve every instance.
 
         Raises:
-            UserError: nobody wrote one.
+            UserError: the task has no script.
         """
         raise UserError(f"task '{self.name}' has no script")
 
@@ -170,12 +170,11 @@ class Task(ABC):
         """Return a simulator with `num_slots` slots.
 
         Args:
-            num_slots: episodes side by side.
-            refinement: physics steps are this many times as many and as short (for checks; a task of a third party
-                may leave this argument out).
+            num_slots: number of parallel episodes.
+            refinement: divides the physics step by this factor (for checks; a third-party task may omit this argument).
         """
 
     @property
     def deployment(self) -> DeploymentSpec | None:
-        """How policies and tools are tried on a robot arm; None: they cannot be."""
+        """How policies and tools are tried on a robot arm; None: the task cannot be deployed."""
         return None

@@ -1,4 +1,4 @@
-"""What a tool is: a graph of links, and the shapes that it is made of."""
+"""A tool: a graph of links, and the shapes of its parts."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import TypeAlias
 
 @dataclass(frozen=True)
 class ToolGraph:
-    """The tool as a graph: its links are the nodes, its joints the edges; node 0 is the link that the robot holds.
+    """The tool as a graph: links are nodes, joints are edges, and the robot holds node 0.
 
-    `parameter_nodes[d]` is the node that design parameter `d` belongs to.
+    `parameter_nodes[d]` is the node of design parameter `d`.
     """
 
     num_nodes: int
@@ -20,7 +20,7 @@ class ToolGraph:
 
 @dataclass(frozen=True)
 class BoxPart:
-    """A box that a tool is made of, in the frame of the held point."""
+    """A box of a tool, in the frame of the held point."""
 
     half_extents: tuple[float, float, float]
     """m."""
@@ -32,7 +32,7 @@ class BoxPart:
 
 @dataclass(frozen=True)
 class PlanarPart:
-    """A straight link with round ends that a planar tool is made of, in the frame of the held point."""
+    """A straight link with round ends of a planar tool, in the frame of the held point."""
 
     start: tuple[float, float]
     """m."""

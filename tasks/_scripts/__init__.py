@@ -1,1 +1,1 @@
-"""Behaviour written by hand, one file per task: designers and controllers that show how a task can be solved."""
+"""Hand-written designers and controllers, one file per task, that show how a task can be solved."""

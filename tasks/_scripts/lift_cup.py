@@ -15,22 +15,22 @@ from ..lift_cup import CUP_HEIGHT, CUP_UNIT, CUP_WIDTH, MAX_MOVE, PRONGS_TO_CUP_
 
 
 class LiftCupScript(Behaviour):
-    """Brings the prongs' middle, or the cross bar, up to the cup with the prongs at its sides; then lifts."""
+    """Moves the prongs' middle, or the cross bar, up to the cup with the prongs at its sides, then lifts."""
 
     TOLERANCE = 0.004
-    """The held end this near to its aim lifts, m."""
+    """The held end lifts when it is within this distance of its target, m."""
     BAR_DISTANCE = 0.005
-    """Free way that the cross bar leaves before the cup's wall, m."""
+    """Gap between the cross bar and the cup's wall, m."""
     LIFTED = 0.003
-    """A cup this high is on its way up, whatever its place, m."""
+    """A cup at this height is being lifted, wherever it is, m."""
     PRONGS: ClassVar[tuple[float, ...]] = (0.0, 0.015, 0.2, 0.04)
-    """Tilt (rad), width, length and height (m) of the script's own tools."""
+    """Tilt (rad), width, length and height (m) of the script's tools."""
 
     def __init__(self, task: LiftCup) -> None:
         self.task = task
 
     def design(self, observation: Singles) -> Singles:
-        """Return long level prongs whose inner faces pass under the middle of the rim."""
+        """Return long, level prongs whose inner faces are below the middle of the rim."""
         goal = self.task.layout.split(np.atleast_2d(observation)).goal
         width = CUP_UNIT * goal[:, CUP_WIDTH]
         designs = np.column_stack([width + RIM_WIDTH, np.tile(self.PRONGS, (len(goal), 1))])
@@ -38,14 +38,15 @@ class LiftCupScript(Behaviour):
         return result if observation.ndim == 2 else result[0]
 
     def act(self, observation: Singles) -> Singles:
-        """Return the held end's move, normalised."""
+        """Return the displacement of the held end, normalised."""
         seen = self.task.layout.split(np.atleast_2d(observation).astype(np.float64))
         _, tilt, _, length, _ = self.task.design_space.from_unit(seen.design).T
         width = CUP_UNIT * seen.goal[:, CUP_WIDTH]
-        # Short prongs cannot have their middle at the cup's: the cross bar would run into its wall before that.
+        # The middle of short prongs cannot reach the cup's centre: the cross bar would hit the wall before.
         short_of_cup = np.maximum(0.0, 0.5 * width + self.BAR_DISTANCE - 0.5 * length * np.cos(tilt))
         way = seen.state[:, PRONGS_TO_CUP_XY] - np.column_stack([0.0 * width, short_of_cup])
         rising = seen.state[:, CUP_HEIGHT] > self.LIFTED
+        # Once the cup rises the script keeps lifting, even if the cup moves away from the target position.
         there: Booleans = (np.abs(way) < self.TOLERANCE).all(axis=1) | rising
         moves = np.column_stack([way / MAX_MOVE, there])
         result: Singles = np.clip(moves, -1.0, 1.0).astype(np.float32)

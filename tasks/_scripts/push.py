@@ -16,31 +16,30 @@ from ..push import BASE, FIRST_LINK_ANGLE, GOAL_RADIUS, PUCK, PUCK_RADIUS, PUCK_
 
 
 class PushScript(Behaviour):
-    """Brings a point of the tool behind the puck as seen from the goal, then moves on towards the goal.
+    """Moves a point of the tool behind the puck as seen from the goal, then moves towards the goal.
 
-    Every link has a few candidate points on both of its sides; the one whose side faces the goal best and that is near
-    is taken. The way there is straight, so the puck may be pushed aside on it: what a tool is good for depends on its
-    shape.
+    Every link has a few candidate points on both sides. The chosen point is near, and its side faces the goal. The tool
+    moves there on a straight path and may push the puck aside, so performance depends on the tool's shape.
     """
 
     SHAPES: ClassVar[tuple[tuple[float, ...], ...]] = (
         (0.8, 0.9, -0.2, 0.2, 0.9),  # goals to the right: a long arm with a hook behind the puck
-        (0.8, 0.9, -0.2, 0.2, 0.9),  # right above: none of 500 random tools solves these with this controller
-        (-0.4, 0.2, -0.3, 0.5, 0.2),  # above: a slanted arm that lifts the puck on its way to the left
+        (0.8, 0.9, -0.2, 0.2, 0.9),  # upper right: none of 500 random tools solves these with this controller
+        (-0.4, 0.2, -0.3, 0.5, 0.2),  # above: a slanted arm that pushes the puck up while it moves to the left
         (-0.6, 0.8, -0.8, 0.4, -0.4),
-        (-0.2, 0.8, -0.8, 0.4, 0.6),  # left: down on the near side of the puck
+        (-0.2, 0.8, -0.8, 0.4, 0.6),  # left: an arm down to the near side of the puck
         (-0.2, -0.8, -0.3, -0.6, 0.5),
         (0.9, -0.1, 0.8, -0.1, 0.5),  # below: a hollow arm above the puck
         (0.6, -0.8, 0.8, 0.5, -0.6),
     )
-    """The best of 500 random tools for goals in each eighth of all directions, from the right anticlockwise."""
+    """The best of 500 random tools for goals in each of eight directions, anticlockwise from the right."""
     POINTS_PER_LINK = 4
     NEARNESS = 0.15
-    """What a metre of way costs, in units of the cosine between a link's side and the way to the goal."""
+    """Cost of a metre of way, in units of the cosine between a link's normal and the direction to the goal."""
     OUT_OF_REACH = 5.0
-    """How many metres of way a metre costs by which a place is beyond the workspace: from there no link reaches."""
+    """Cost of a metre outside of the workspace, in metres of way: the held end cannot get to such a place."""
     READY = 0.4
-    """The held end this near to its place moves on towards the goal, m."""
+    """The held end moves towards the goal when it is within this distance of its place, m."""
     MAX_PUSH = 0.7
     """Largest normalised speed of a push."""
 
@@ -48,7 +47,7 @@ class PushScript(Behaviour):
         self.task = task
 
     def design(self, observation: Singles) -> Singles:
-        """Return one of eight tools by the goal's direction."""
+        """Return one of eight tools for the goal's direction."""
         to_goal = self.task.layout.split(observation).state[..., PUCK_TO_GOAL]
         count = len(self.SHAPES)
         turn = np.arctan2(to_goal[..., 1], to_goal[..., 0]) / (2.0 * np.pi)
@@ -62,7 +61,8 @@ class PushScript(Behaviour):
         distance = np.linalg.norm(to_goal, axis=1, keepdims=True)
         heading = to_goal / np.maximum(distance, 1e-9)
         points, sides = self._places(seen.design)
-        # Where the held end is when a link's point touches the puck and pushes it along `sides`.
+        # Position of the held end at which a link's point touches the puck and pushes it along `sides`: the chain does
+        # not rotate, so point and held end keep the same offset.
         held = puck[:, None] - (PUCK_RADIUS + LINK_HALF_WIDTH) * sides - points
         reachable = np.clip(held, *WORKSPACE.bounds)
         missed = np.linalg.norm(reachable - held, axis=2)
@@ -70,14 +70,14 @@ class PushScript(Behaviour):
         score = (sides * heading[:, None]).sum(axis=2) - self.NEARNESS * cost
         way = held[np.arange(len(puck)), score.argmax(axis=1)] - base
         ready = np.linalg.norm(way, axis=1, keepdims=True) < self.READY
-        # The push slows down before the goal: a puck that no link pushes any more still slides.
+        # The push slows down before the goal, because a puck slides on after the link has stopped.
         speed = np.clip((distance - 0.5 * GOAL_RADIUS) / GOAL_RADIUS, 0.0, self.MAX_PUSH)
         control = np.where(ready, way + speed * heading, np.clip(way, -1.0, 1.0))
         result: Singles = np.clip(control, -1.0, 1.0).astype(np.float32)
         return result if observation.ndim == 2 else result[0]
 
     def _places(self, designs: Floats) -> tuple[Floats, Floats]:
-        """Return points on the links, from the held end, and the direction in which each pushes: (B, P, 2) twice."""
+        """Return points on the links, relative to the held end, and the directions of their push: (B, P, 2) each."""
         chain = chain_points(self.task.design_space.from_unit(designs), FIRST_LINK_ANGLE)
         link = chain[:, 1:] - chain[:, :-1]
         share = (np.arange(self.POINTS_PER_LINK) + 0.5) / self.POINTS_PER_LINK

@@ -34,7 +34,7 @@ class Scoop3DScript(Behaviour):
         self.task = task
 
     def design(self, observation: Singles) -> Singles:
-        """Return the tool for the number of balls wanted."""
+        """Return the tool for the requested number of balls."""
         wanted = np.rint(self.task.layout.split(observation).goal[..., BALLS_WANTED]).astype(np.intp)
         tools: Singles = np.array(self.TOOLS, dtype=np.float32)[wanted - WANTED[0]]
         return tools

@@ -130,7 +130,7 @@ def test_a_task_without_positions_refuses_a_cutout(monkeypatch: pytest.MonkeyPat
 def test_a_task_without_fine_tuning_instances_says_so(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     arguments = ["run", "--method", "gnn_ppo", "--task", "push", "--scratch", "1", "--out", str(tmp_path)]
     assert main(arguments) == 2
-    assert "task 'push' names no instances for fine-tuning" in capsys.readouterr().err
+    assert "task 'push' has no fine-tuning instances" in capsys.readouterr().err
 
 
 def test_values_are_read_by_the_kind_of_their_axis() -> None:

@@ -55,7 +55,7 @@ def test_run_status_and_plot(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ([*RUN, "--device", "cuda"], "--device"),
         ([*RUN, "--set", "device=cuda"], "--device"),
         ([*RUN, "--device", "abacus"], "cuda"),
-        ([*RUN, "--scheduler", "tcp://localhost:1"], "--scheduler goes with --backend dask"),
+        ([*RUN, "--scheduler", "tcp://localhost:1"], "--scheduler needs --backend dask"),
         ([*RUN, "--backend", "ray"], "--backend"),
         ([*RUN, "--import", "no_such_module"], "no_such_module"),
         (["show", "--method", "toy_search", "--task", "pull"], "toy_reach"),

@@ -16,7 +16,7 @@ from codesign_bench.cli import main
         (["--policy", "x", "--behaviour", "random", "--out", "push.png"], "either --policy or --behaviour"),
         (["--task", "push", "--episodes", "0", "--out", "push.png"], "--episodes must be at least 1"),
         (["--policy", "nowhere", "--out", "push.png"], "is not a cell folder"),
-        (["--task", "push", "--out", "/proc/push.png"], "cannot write there"),
+        (["--task", "push", "--out", "/proc/push.png"], "not writable"),
     ],
 )
 def test_bad_input_gets_one_line(capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:

@@ -17,7 +17,7 @@ from reports import make_cell
         (("--results", "empty"), "no cells in 'empty'"),
         (("--results", "runs", "--out", "report.pdf"), ".html"),
         (("--results", "runs", "--out", "folder.html"), "folder.html"),
-        (("--results", "runs", "--out", "runs/reach/gnn_ppo/default/seed-00/cell.json/report.html"), "cannot write"),
+        (("--results", "runs", "--out", "runs/reach/gnn_ppo/default/seed-00/cell.json/report.html"), "not writable"),
     ],
 )
 def test_bad_input_is_named_in_a_line(

@@ -71,7 +71,7 @@ def test_a_bad_value_is_the_users_error(search: type[Method[Any]], override: str
         ("episode=2", "unknown key 'episode'.*episodes"),
         ("toy_search.steps=2", "unknown key 'steps'"),
         ("gnn=2.", "unknown key 'gnn'"),
-        ("other.episodes=2", "'other' is none of the selected methods.*toy_search"),
+        ("other.episodes=2", "'other' is not a selected method.*toy_search"),
         ("episodes", "key=value"),
         ("=3", "key=value"),
     ],

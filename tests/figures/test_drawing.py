@@ -154,5 +154,5 @@ def test_a_folder_is_made_and_left_empty_or_refused(tmp_path: Path) -> None:
     make_folder(tmp_path / "new" / "figures")
     assert list((tmp_path / "new" / "figures").iterdir()) == []
     (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="file/figures: cannot write there"):
+    with pytest.raises(UserError, match="file/figures: not writable"):
         make_folder(tmp_path / "file" / "figures")

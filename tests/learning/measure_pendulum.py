@@ -18,7 +18,7 @@ import gymnasium
 import numpy as np
 import stable_baselines3
 import torch
-from pendulum import BUDGET, ENVIRONMENT, MAX_TORQUE, OURS, STABLE_BASELINES3, Pendulum, train
+from pendulum import BUDGET, ENVIRONMENT, ENVIRONMENTS, MAX_TORQUE, OURS, STABLE_BASELINES3, Pendulum, train
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecNormalize
 
@@ -53,7 +53,7 @@ class Reference(Policy):
 def train_reference(seed: int, normalize_observations: bool) -> float:
     """Train stable-baselines3's PPO; return its mean return over the task's evaluation instances."""
     torch.set_num_threads(1)
-    environments: Any = make_vec_env(ENVIRONMENT, n_envs=4, seed=seed)
+    environments: Any = make_vec_env(ENVIRONMENT, n_envs=ENVIRONMENTS, seed=seed)
     normalize: Callable[[Singles], Singles] = np.copy
     if normalize_observations:
         environments = VecNormalize(environments, norm_obs=True, norm_reward=False, clip_obs=RunningNorm.CLIP)

@@ -26,6 +26,8 @@ ENVIRONMENT = "Pendulum-v1"
 MAX_TORQUE = 2.0
 BUDGET = 100_000
 
+ENVIRONMENTS = 4
+"""That stable-baselines3 steps side by side."""
 STABLE_BASELINES3: dict[str, Any] = {
     "n_steps": 1024,
     "batch_size": 64,
@@ -37,19 +39,19 @@ STABLE_BASELINES3: dict[str, Any] = {
     "max_grad_norm": 0.5,
     "ent_coef": 0.0,
 }
-"""stable-baselines3's hyperparameters for 4 environments; its networks have two tanh layers of 64."""
+"""stable-baselines3's hyperparameters; its networks have two tanh layers of 64."""
 
 OURS: dict[str, Any] = {
-    "batch_size": 4 * 1024,
-    "minibatch_size": 64,
-    "epochs": 10,
-    "policy_learning_rate": 1e-3,
-    "value_learning_rate": 1e-3,
-    "gamma": 0.9,
-    "gae_lambda": 0.95,
-    "clip_ratio": 0.2,
-    "max_gradient_norm": 0.5,
-    "entropy_weight": 0.0,
+    "batch_size": ENVIRONMENTS * STABLE_BASELINES3["n_steps"],
+    "minibatch_size": STABLE_BASELINES3["batch_size"],
+    "epochs": STABLE_BASELINES3["n_epochs"],
+    "policy_learning_rate": STABLE_BASELINES3["learning_rate"],
+    "value_learning_rate": STABLE_BASELINES3["learning_rate"],
+    "gamma": STABLE_BASELINES3["gamma"],
+    "gae_lambda": STABLE_BASELINES3["gae_lambda"],
+    "clip_ratio": STABLE_BASELINES3["clip_range"],
+    "max_gradient_norm": STABLE_BASELINES3["max_grad_norm"],
+    "entropy_weight": STABLE_BASELINES3["ent_coef"],
     "kl_threshold": float("inf"),
     "control_log_std": math.log(1.0 / MAX_TORQUE),
     "fix_std": False,

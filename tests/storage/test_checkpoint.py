@@ -199,7 +199,7 @@ def test_another_checkpoints_large_file_is_refused(tmp_path: Path) -> None:
     first, second = tmp_path / "1", tmp_path / "2"
     large_file(first / "checkpoint").replace(large_file(second / "checkpoint"))
     for read in (load_checkpoint, check_checkpoint):
-        with pytest.raises(UserError, match="another one than the checkpoint names"):
+        with pytest.raises(UserError, match="its checksums are not those of the checkpoint"):
             read(second / "checkpoint")
 
 

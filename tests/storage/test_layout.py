@@ -25,7 +25,7 @@ def test_a_results_folder_is_marked_and_a_foreign_one_left_alone(tmp_path: Path)
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="file/runs: cannot write there"):
+    with pytest.raises(UserError, match="file/runs: not writable"):
         open_folder(tmp_path / "file" / "runs")
 
 

@@ -84,7 +84,7 @@ def test_a_record_of_version_0_1_0_is_read_with_the_axes_that_it_had() -> None:
     ("damage", "named"),
     [
         ({"status": "sleeping"}, "unknown status 'sleeping'"),
-        ({"schema": 99}, "schema 99, made by a newer version"),
+        ({"schema": 99}, "schema 99 is from a newer version"),
         ({"config": {"run": {}}}, "no 'method'"),
         ({"config": None}, "NoneType"),
         ({"env_steps": "many"}, "many"),

@@ -10,13 +10,12 @@ import pandas as pd
 import pytest
 
 from builders import VERSION_0_1_0
-from codesign_bench import load_policy, load_results, load_task
+from codesign_bench import load_results
 from codesign_bench.cli import main
-from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.storage.cells import find_cells
 from codesign_bench.storage.frames import load_evaluations, rows_varying
 from codesign_bench.storage.layout import EVALUATION_FILE
-from played_alike import assert_played_alike
+from played_alike import assert_plays_as_stored
 
 SETTINGS = "batch_size=600 minibatch_size=150 epochs=2 design_epochs=2 popsize=4 episodes_per_candidate=1"
 SETTINGS += " policy_net=16,16 value_net=16,16 control_gnn=16,16 control_index_mlp=16 design_gnn=16,16"
@@ -68,9 +67,10 @@ def test_frames_have_every_axis_as_a_column() -> None:
 def test_a_policy_does_what_its_curve_says(cell: str) -> None:
     folder = VERSION_0_1_0 / cell / "default" / "seed-00"
     (told,) = (found for found in find_cells(VERSION_0_1_0) if found.folder == folder)
-    episodes = pd.read_csv(folder / EVALUATION_FILE)
-    assert_played_alike(evaluate(load_task(told.record.task), load_policy(folder)), episodes)
-    assert episodes["return"].mean() == pytest.approx(told.last_evaluation()["return_mean"])
+    assert_plays_as_stored(told, episodes=32)
+    assert pd.read_csv(folder / EVALUATION_FILE)["return"].mean() == pytest.approx(
+        told.last_evaluation()["return_mean"]
+    )
 
 
 @pytest.mark.parametrize(("methods", "task", "grid", "settings"), MADE_BY)
@@ -81,7 +81,7 @@ def test_finished_cells_count_as_done_and_are_left_alone(
     line = f"run --method {methods} --task {task} {grid} --steps 1200 --profile quick --set {settings} --out {results}"
     assert main(line.split()) == 0
     first = capsys.readouterr().out.splitlines()[0]
-    assert first.split()[0] == first.split()[2]  # "6 cells, 6 of them done before"
+    assert first.split()[0] == first.split()[2]  # "6 cells, 6 of them already done"
     assert contents(results) == before
 
 

@@ -72,7 +72,7 @@ def test_a_killed_worker_costs_no_cell_and_changes_no_curve(cluster: Any, tmp_pa
     assert code == 0, text
     assert curves(here).equals(curves(there))
     code, text = sweep(cells(delay=0.05), there, backend="dask", scheduler=cluster.scheduler_address)
-    assert (code, "4 of them done before" in text) == (0, True)
+    assert (code, "4 of them already done" in text) == (0, True)
 
 
 def test_failures_are_recorded_as_elsewhere(cluster: Any, tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ def test_a_second_run_skips_what_is_done_and_runs_what_is_new(tmp_path: Path) ->
     before = (CELL.folder(tmp_path) / "curve.csv").read_bytes()
     code, text = sweep(cells(2), tmp_path)
     assert code == 0
-    assert "2 cells, 1 of them done before" in text
+    assert "2 cells, 1 of them already done" in text
     assert (CELL.folder(tmp_path) / "curve.csv").read_bytes() == before
     assert load_results(tmp_path)["seed"].unique().tolist() == [0, 1]
 

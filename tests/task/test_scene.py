@@ -39,5 +39,5 @@ def test_constants_are_found_by_the_row_that_they_stand_for(module: ModuleType) 
 
 def test_two_constants_for_one_row_are_refused(module: ModuleType) -> None:
     twice = {**constants(module.__name__), "MORE_STEPS": Constant(5, "1", OURS, "Steps")}
-    with pytest.raises(ValueError, match="MORE_STEPS is not the only constant for the row 'Steps'"):
+    with pytest.raises(ValueError, match="MORE_STEPS is the second constant for the row 'Steps'"):
         by_row(twice)

@@ -49,14 +49,14 @@ def test_a_name_that_is_not_there_is_answered_with_those_that_are() -> None:
 
 @pytest.mark.parametrize("names", [("puck_y", "puck_x"), ("puck_x", "ball_1"), ("end", "puck_x"), ()])
 def test_a_slice_is_of_neighbours_in_the_order_of_the_space(names: tuple[str, ...]) -> None:
-    with pytest.raises(ValueError, match="not neighbours in this order"):
+    with pytest.raises(ValueError, match="not adjacent in this order"):
         STATE.slice(*names)
 
 
 def test_a_group_has_members_and_nothing_between_them() -> None:
     with pytest.raises(ValueError, match="no names"):
         STATE.group("cube_")
-    with pytest.raises(ValueError, match="not neighbours"):
+    with pytest.raises(ValueError, match="not adjacent"):
         Box.of(ball_1=(0.0, 1.0, "1"), end=(0.0, 1.0, "1"), ball_2=(0.0, 1.0, "1")).group("ball_")
 
 

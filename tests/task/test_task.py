@@ -36,9 +36,12 @@ def test_evaluation_instances_are_always_the_same(task: Task) -> None:
     ("ask", "answer"),
     [
         (lambda task: task.in_region(np.zeros((1, 1))), "neither goals nor starts of task 'toy_reach' are positions"),
-        (lambda task: task.in_cutout(np.zeros((1, 1)), 0.5), "--cutout: neither goals nor starts of task 'toy_reach'"),
-        (lambda task: task.fine_tuning_instances(), "names no instances for fine-tuning"),
-        (lambda task: task.tool_parts(np.zeros(1)), "does not say what its tools are made of"),
+        (
+            lambda task: task.in_cutout(np.zeros((1, 1)), 0.5),
+            "--cutout needs a task whose goals or starts are positions; 'toy_reach' has none",
+        ),
+        (lambda task: task.fine_tuning_instances(), "has no fine-tuning instances"),
+        (lambda task: task.tool_parts(np.zeros(1)), "does not define the parts of its tools"),
         (lambda task: task.script(), "has no script"),
     ],
 )

@@ -16,24 +16,38 @@ from codesign_bench.task import load_task
 bullet: Any = import_module("codesign_bench.tasks._bullet")
 
 
-def test_worlds_are_made_when_used_and_handed_on() -> None:
+@pytest.fixture
+def connected(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The worlds that PyBullet makes during the test."""
+    made: list[int] = []
+    connect = bullet.pybullet.connect
+
+    def remember(*arguments: Any, **options: Any) -> int:
+        made.append(connect(*arguments, **options))
+        return made[-1]
+
+    monkeypatch.setattr(bullet.pybullet, "connect", remember)
+    return made
+
+
+def test_worlds_are_made_when_used_and_handed_on(connected: list[int]) -> None:
     task, slots = load_task("fetch_cube"), np.arange(3)
-    first: Any = task.make_simulator(1_000)
-    assert set(first.worlds) == {None}
-    first.begin(slots, task.evaluation_instances()[:3])
-    used = set(first.worlds[:3])
-    assert not used & {None, *bullet._idle_worlds}
+
+    def begun(num_slots: int) -> Any:
+        simulator = task.make_simulator(num_slots)
+        simulator.begin(slots, task.evaluation_instances()[:3])
+        return simulator
+
+    first, second = begun(1_000), begun(3)
+    assert len(connected) <= 6, "slots that nobody begins need no world"
+    assert not set(first.worlds[:3]) & set(second.worlds), "a world belongs to one simulator"
+    assert set(connected) <= {*first.worlds, *second.worlds}
+    handed_on, before = set(first.worlds[:3]), len(connected)
     del first
     gc.collect()
-    assert used <= set(bullet._idle_worlds)
-    second: Any
-    third: Any
-    second, third = (task.make_simulator(3) for _ in range(2))
-    before = set(bullet._idle_worlds)
-    for simulator in (second, third):
-        simulator.begin(slots, task.evaluation_instances()[:3])
-    assert set(second.worlds) <= before
-    assert not set(second.worlds) & set(third.worlds), "a world belongs to one simulator"
+    assert not set(begun(3).worlds) & set(second.worlds)
+    assert len(connected) == before, "the worlds of a simulator that is gone are there to be used"
+    assert all(bullet.pybullet.isConnected(world) for world in handed_on)
 
 
 @pytest.mark.numeric

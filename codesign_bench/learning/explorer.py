@@ -1,11 +1,7 @@
 """The interface for choosing actions while a batch is collected, for any kind of learner.
 
-<<<<<<< HEAD
 Shapes: `S` slots of a batch, `b` slots that take a step at once, `O` observation, `D` design, `C` control, `Z` noise,
 `E` episodes of a slot, `I` instance.
-=======
-Shapes: `S` slots of a batch, `b` slots that step together, `O` observation, `D` design, `C` control, `Z` noise.
->>>>>>> f0635f779130280050ee4740bab68619d882ff1a
 
 An on-policy learner samples its policy and stores log-probabilities as extras; an off-policy learner stores none; a
 population-based learner gives every slot its own candidate.
@@ -67,11 +63,7 @@ class Trial:
 
 
 class FixedDesigns(Explorer):
-<<<<<<< HEAD
     """Another explorer's controls with designs, and perhaps instances, chosen before the batch."""
-=======
-    """Another explorer's controls with fixed designs, one per slot."""
->>>>>>> f0635f779130280050ee4740bab68619d882ff1a
 
     def __init__(self, explorer: Explorer, trial: Trial) -> None:
         super().__init__(0, explorer.control_noise)

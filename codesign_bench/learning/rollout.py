@@ -63,13 +63,9 @@ class _Rollout:
         # One draw for all steps: a draw per step would be slower and would depend on which slots are active.
         self.control_noise = rng.standard_normal((num_slots, capacity, explorer.control_noise), dtype=np.float32)
         self.time = np.zeros(num_slots, dtype=np.intp)
-<<<<<<< HEAD
         """(S,) steps that each slot has taken."""
         self.episode = np.zeros(num_slots, dtype=np.intp)
         """(S,) episodes that each slot has begun."""
-=======
-        """(S,) number of steps that each slot has taken."""
->>>>>>> f0635f779130280050ee4740bab68619d882ff1a
 
     def play(self) -> Trajectories:
         """Play until every slot has taken its share of the steps."""

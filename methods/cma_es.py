@@ -15,7 +15,7 @@ import numpy as np
 
 from codesign_bench.config.settings import Settings
 from codesign_bench.config.validation import check_range
-from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
+from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, fitness_metrics
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Booleans, Floats, Singles, Task
@@ -116,7 +116,8 @@ class CmaEs(Method[Config]):
             "train_return": float(fitness.mean()),
             "train_best_return": float(fitness.max()),
             "train_success": solved,
-            "sigma": self.evolution.sigma,
+            **fitness_metrics(returns),
+            **self.evolution.metrics(),
         }
         return BatchReport(steps, metrics)
 

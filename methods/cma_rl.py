@@ -3,6 +3,8 @@
 Source: the paper, section "Evaluating sample efficiency" and its table of baseline hyperparameters. Every PPO batch
 plays whole episodes with the candidates of one generation; a candidate's fitness is its mean return in that batch, and
 every one of those steps counts.
+
+Shapes: `P` candidates of a generation, `R` rounds of slots, `E` episodes of a slot, `K` instances, `D` design.
 """
 
 from __future__ import annotations
@@ -18,16 +20,16 @@ from torch import Tensor, nn
 from codesign_bench.config.settings import Settings
 from codesign_bench.learning.actor import Actor, ActorPolicy
 from codesign_bench.learning.checkpointing import load_module_arrays
-from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
+from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, fitness_metrics
+from codesign_bench.learning.explorer import Trial
 from codesign_bench.learning.features import Features
-from codesign_bench.learning.gae import episode_returns
 from codesign_bench.learning.networks import MLP, RunningNorm, torch_generator
 from codesign_bench.learning.ppo_config import PerceptronConfig
 from codesign_bench.learning.two_phase import TwoPhaseLearner
 from codesign_bench.learning.value_networks import MLPValue
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
-from codesign_bench.task import Singles, Slots, Task
+from codesign_bench.task import Floats, Task
 
 from ._settings import SMALL_PERCEPTRONS, SMALL_PPO, Tuned, ppo_settings, tuned
 
@@ -94,7 +96,7 @@ class CmaRl(Method[Config]):
         self.evolution = Evolution(problem.task.design_space.size, config, streams["designs"])
         self.actor = GivenDesignActor(problem.task, config, streams["policy weights"])
         value = MLPValue(problem.task, config.value_net, streams["value weights"])
-        self.learner = TwoPhaseLearner(problem, config, streams, self.actor, value, self._candidates)
+        self.learner = TwoPhaseLearner(problem, config, streams, self.actor, value, self._generation)
 
     @classmethod
     def small(cls) -> Mapping[str, Any]:
@@ -114,26 +116,44 @@ class CmaRl(Method[Config]):
         """Update the networks on the device `name`."""
         self.learner.use_device(name)
 
-    def _candidates(self, slots: Slots) -> Singles:
-        """Assign the candidates of this generation to slots in turn."""
-        designs: Singles = self.evolution.ask()[slots % self.config.popsize].astype(np.float32)
-        return designs
+    def _generation(self, steps: int, slots: int) -> Trial:
+        """Give slot after slot the candidates of this generation in turn, in whole rounds of the generation.
+
+        In a round every candidate meets the same instances in the same order: on instances of their own, most of what
+        tells candidates apart would be which instances they met.
+        """
+        popsize = self.config.popsize
+        rounds = max(1, slots // popsize)
+        slots = min(slots, rounds * popsize)
+        most = steps // slots // 2 + 1  # An episode has a design step and a control step at least.
+        drawn = self.problem.sample_instances(self.streams["generation's instances"], rounds * most)
+        instances = drawn.reshape(rounds, most, -1)[np.arange(slots) // popsize]
+        return Trial(self.evolution.ask()[np.arange(slots) % popsize].astype(np.float32), instances)
 
     def train(self, remaining_steps: int) -> BatchReport:
         """Play a batch with one generation of designs, update the controller on it, and give CMA-ES the returns.
 
-        A last batch that is too small for every candidate trains only the controller.
+        A last batch that is too small to try every candidate only trains the controller.
         """
         report, batch = self.learner.train(remaining_steps)
-        # At the design step the sum of rewards to the end of the episode is the episode's return; summed over a slot,
-        # it is the total of all its episodes. Returns are undiscounted, as in the evaluation.
-        returns = np.where(batch.is_design, episode_returns(batch.reward, batch.episode_end), 0.0).sum(axis=1)
-        candidate = np.arange(len(returns)) % self.config.popsize
-        episodes = np.bincount(candidate, batch.is_design.sum(axis=1), minlength=self.config.popsize)
-        if (episodes > 0).all():
-            self.evolution.tell(np.bincount(candidate, returns, minlength=self.config.popsize) / episodes)
+        metrics = dict(report.metrics)
+        if len(batch.valid) >= self.config.popsize:
+            returns = self._on_common_instances(batch.episode_returns)
+            self.evolution.tell(returns.mean(axis=1))
             self.actor.best_design.copy_(torch.from_numpy(self.evolution.mean))
-        return replace(report, metrics=report.metrics | {"sigma": self.evolution.sigma})
+            metrics |= fitness_metrics(returns)
+        return replace(report, metrics=metrics | self.evolution.metrics())
+
+    def _on_common_instances(self, returns: list[Floats]) -> Floats:
+        """Return the returns (P, K) of every candidate on the instances that all candidates have met.
+
+        Episodes that only some slots of a round had time for are left out: they were of whoever ended others sooner.
+        """
+        popsize = self.config.popsize
+        rounds = [returns[first : first + popsize] for first in range(0, len(returns), popsize)]
+        common = [min(len(of_slot) for of_slot in slots) for slots in rounds]
+        parts = [np.array([of_slot[:count] for of_slot in slots]) for slots, count in zip(rounds, common, strict=True)]
+        return np.concatenate(parts, axis=1)
 
     def policy(self) -> Policy:
         """Return the mean design of CMA-ES with the mean of the controller."""

@@ -1,6 +1,6 @@
 """CMA-ES by pycma (Hansen), with a state that can be saved without pickle.
 
-Shapes: `P` candidates of a generation, `X` parameters.
+Shapes: `P` candidates of a generation, `X` parameters, `K` instances.
 
 The state of pycma is a function of its random numbers and the fitness values. So the saved state is the fitness
 history: to resume, the same generations are asked and told again, which gives the same numbers.
@@ -9,7 +9,7 @@ history: to resume, the same generations are asked and told again, which gives t
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import inf
+from math import inf, isnan, nan
 from typing import Any
 
 import cma
@@ -65,6 +65,7 @@ class Evolution:
             "verb_disp": 0,
         }
         self._strategy = cma.CMAEvolutionStrategy(np.zeros(size), config.sigma0, options)
+        self.sigma0 = config.sigma0
         self._asked: list[Any] | None = None
         self.history: list[list[float]] = []
 
@@ -92,7 +93,53 @@ class Evolution:
         """The overall standard deviation of the search distribution."""
         return float(self._strategy.sigma)
 
+    @property
+    def converged(self) -> bool:
+        """Whether one of pycma's criteria says that going on is pointless, e.g. that the distribution has shrunk."""
+        return bool(self._strategy.stop())
+
+    def metrics(self) -> dict[str, float]:
+        """Return what is logged of the search."""
+        return {
+            "generations": float(len(self.history)),
+            "sigma": self.sigma,
+            "sigma_fraction": self.sigma / self.sigma0,
+            "converged": float(self.converged),
+        }
+
     def replay(self, history: Floats) -> None:
         """Repeat generations with the stored fitness (generations, P), on a new object with the same generator."""
         for fitness in history:
             self.tell(fitness)
+
+
+def reliability(returns: Floats) -> float:
+    """Return how much of the variance of candidates' mean returns is due to the candidates, from 0 to 1.
+
+    It is the intraclass correlation ICC(3, k) of Shrout and Fleiss (1979): candidates are rated by the same K
+    instances, whose own difficulty shifts all candidates alike and does not count as noise.
+
+    Args:
+        returns: (P, K) of P candidates on the same K instances.
+
+    Returns:
+        The share; NaN where there is one instance or one candidate, or where all candidates' means are equal.
+    """
+    count, instances = returns.shape
+    if count < 2 or instances < 2:
+        return nan
+    means = returns.mean(axis=1)
+    residual = returns - means[:, None] - returns.mean(axis=0) + returns.mean()
+    between = instances * means.var(ddof=1)
+    within = (residual**2).sum() / ((count - 1) * (instances - 1))
+    return max(0.0, float(1.0 - within / between)) if between > 0.0 else nan
+
+
+def fitness_metrics(returns: Floats) -> dict[str, float]:
+    """Return what is logged of the returns (P, K) that a generation's fitness is the mean of.
+
+    The reliability is left out where there is none.
+    """
+    share = reliability(returns)
+    known = {} if isnan(share) else {"fitness_reliability": share}
+    return {"fitness_instances": float(returns.shape[1]), **known}

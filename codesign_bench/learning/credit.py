@@ -164,16 +164,22 @@ class SeparateCredit(DesignCredit):
         self.value.update_returns(returns)
         with torch.no_grad():
             advantage = normalized(returns - self.value.denormalized(observation))
+        log_probs, rows = self._of_designs(observation, design), np.arange(len(returns))
+        with torch.no_grad():
+            # Of the designer as it is now, not of the rollout's: where both phases share a trunk, the control update
+            # has just moved the designer too, and measured from the rollout the KL stop would end the design update
+            # for what the control update did.
+            old_log_prob = log_probs(rows)[0]
         policy = PolicyUpdate(
             PolicyLoss.of(config, config.design_kl_threshold),
-            self._of_designs(observation, design),
+            log_probs,
             self.optimizers["design"],
-            tensor(batch.extras[LOG_PROB][where]),
+            old_log_prob,
             advantage,
         )
         target = self.value.normalized(returns)
         value = ValueUpdate(self.value, self.optimizers["design_value"], observation, target, config.max_gradient_norm)
-        rows, rng = np.arange(len(returns)), self.streams["design minibatches"]
+        rng = self.streams["design minibatches"]
         self.loop.run((policy, value), rows, config.design_epochs, config.design_minibatch_size, rng)
         return {"design_kl": policy.divergence, "design_steps": float(policy.steps), "design_value_loss": value.loss}
 

@@ -1,6 +1,7 @@
 """The interface for choosing actions while a batch is collected, for any kind of learner.
 
-Shapes: `S` slots of a batch, `b` slots that step together, `O` observation, `D` design, `C` control, `Z` noise.
+Shapes: `S` slots of a batch, `b` slots that take a step at once, `O` observation, `D` design, `C` control, `Z` noise,
+`E` episodes of a slot, `I` instance.
 
 An on-policy learner samples its policy and stores log-probabilities as extras; an off-policy learner stores none; a
 population-based learner gives every slot its own candidate.
@@ -12,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from codesign_bench.task import Singles, Slots
+from codesign_bench.task import Floats, Singles, Slots
 
 
 @dataclass(frozen=True)
@@ -46,19 +47,36 @@ class Explorer(ABC):
     def sample_control(self, slots: Slots, observation: Singles, noise: Singles) -> Sample:
         """Return controls for `slots` (b,) of the batch from `observation` (b, O) and `noise` (b, Z)."""
 
+    def instances(self, slots: Slots, episode: Slots) -> Floats | None:
+        """Return the instances (b, I) of the episodes numbered `episode` (b,) of their slots; None: draw them."""
+        return None
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a batch tries: one design for all episodes of a slot, and perhaps the instances to try it on."""
+
+    unit_designs: Singles
+    """(S, D) in [-1, 1]."""
+    instances: Floats | None = None
+    """(S, E, I), taken in turn by a slot's episodes; None: each episode draws its own."""
+
 
 class FixedDesigns(Explorer):
-    """Another explorer's controls with fixed designs, one per slot."""
+    """Another explorer's controls with designs, and perhaps instances, chosen before the batch."""
 
-    def __init__(self, explorer: Explorer, unit_designs: Singles) -> None:
+    def __init__(self, explorer: Explorer, trial: Trial) -> None:
         super().__init__(0, explorer.control_noise)
-        self.explorer = explorer
-        self.unit_designs = unit_designs
-        """(S, D) in [-1, 1]."""
+        self.explorer, self.trial = explorer, trial
 
     def sample_design(self, slots: Slots, observation: Singles, noise: Singles) -> Sample:
         """Return the slots' designs."""
-        return Sample(self.unit_designs[slots])
+        return Sample(self.trial.unit_designs[slots])
+
+    def instances(self, slots: Slots, episode: Slots) -> Floats | None:
+        """Return the instances that were chosen, from the first again after the last."""
+        chosen = self.trial.instances
+        return None if chosen is None else chosen[slots, episode % chosen.shape[1]]
 
     def sample_control(self, slots: Slots, observation: Singles, noise: Singles) -> Sample:
         """Return the other explorer's controls."""

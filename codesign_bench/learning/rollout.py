@@ -63,7 +63,9 @@ class _Rollout:
         # One draw for all steps: a draw per step would be slower and would depend on which slots are active.
         self.control_noise = rng.standard_normal((num_slots, capacity, explorer.control_noise), dtype=np.float32)
         self.time = np.zeros(num_slots, dtype=np.intp)
-        """(S,) number of steps that each slot has taken."""
+        """(S,) steps that each slot has taken."""
+        self.episode = np.zeros(num_slots, dtype=np.intp)
+        """(S,) episodes that each slot has begun."""
 
     def play(self) -> Trajectories:
         """Play until every slot has taken its share of the steps."""
@@ -81,7 +83,11 @@ class _Rollout:
 
     def _design(self, slots: Slots) -> None:
         """Begin an episode in `slots` (b,) and take its design step."""
-        self.episodes.begin(slots, self.problem.sample_instances(self.rng, slots.size))
+        instances = self.explorer.instances(self.first_slot + slots, self.episode[slots])
+        if instances is None:
+            instances = self.problem.sample_instances(self.rng, slots.size)
+        self.episodes.begin(slots, instances)
+        self.episode[slots] += 1
         observation = self.episodes.observation[slots]
         noise = self.rng.standard_normal((slots.size, self.explorer.design_noise), dtype=np.float32)
         sample = self.explorer.sample_design(self.first_slot + slots, observation, noise)

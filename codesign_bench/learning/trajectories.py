@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from codesign_bench.learning.gae import episode_returns
 from codesign_bench.task import Booleans, Floats, Singles
 
 
@@ -74,6 +75,12 @@ class Trajectories:
     def episode_end(self) -> Booleans:
         """(S, T) whether a step is the last of its episode."""
         return self.terminated | self.truncated
+
+    @property
+    def episode_returns(self) -> list[Floats]:
+        """Of each slot, the undiscounted returns of its episodes in their order."""
+        returns = episode_returns(self.reward, self.episode_end)
+        return [returns[slot, self.is_design[slot]] for slot in range(len(returns))]
 
     @property
     def next_observation(self) -> Singles:

@@ -20,7 +20,7 @@ from codesign_bench.learning.checkpointing import learner_arrays, load_learner_a
 from codesign_bench.learning.compute import Compute
 from codesign_bench.learning.credit import DesignCredit, JointCredit, NoCredit, SeparateCredit, Steps
 from codesign_bench.learning.critic import Critic, Estimates
-from codesign_bench.learning.explorer import Explorer, FixedDesigns
+from codesign_bench.learning.explorer import Explorer, FixedDesigns, Trial
 from codesign_bench.learning.optimizers import Annealing, adam
 from codesign_bench.learning.ppo import LogProbs, PolicyLoss, PolicyUpdate, ValueUpdate, normalized
 from codesign_bench.learning.ppo_config import PPOConfig
@@ -29,10 +29,10 @@ from codesign_bench.learning.update_loop import UpdateLoop
 from codesign_bench.learning.value_networks import ValueNetwork
 from codesign_bench.method import BatchReport, Policy, Problem, State
 from codesign_bench.seeding import Streams
-from codesign_bench.task import Singles, Slots
+from codesign_bench.task import Slots
 
-ChooseDesigns = Callable[[Slots], Singles]
-"""Maps slots (b,) to designs (b, D), one for all episodes of a slot in the next batch."""
+ChooseTrial = Callable[[int, int], Trial]
+"""Maps the steps and the number of slots of the batch to come to what it tries; the trial may use fewer slots."""
 
 
 class TwoPhaseLearner:
@@ -45,11 +45,11 @@ class TwoPhaseLearner:
         streams: Streams,
         actor: Actor,
         value: ValueNetwork,
-        choose_designs: ChooseDesigns | None = None,
+        choose_trial: ChooseTrial | None = None,
         loop: UpdateLoop | None = None,
     ) -> None:
         self.problem, self.config, self.streams = problem, config, streams
-        self.actor, self.value, self.choose_designs = actor, value, choose_designs
+        self.actor, self.value, self.choose_trial = actor, value, choose_trial
         self.collector = BatchCollector(problem, streams)
         self.compute = Compute(config.precision)
         self.loop = loop or UpdateLoop()
@@ -64,7 +64,7 @@ class TwoPhaseLearner:
         self.env_steps = 0
 
     def _make_credit(self) -> DesignCredit:
-        if self.choose_designs is not None:
+        if self.choose_trial is not None:
             return NoCredit(self.actor, self.compute)
         if self.config.design_credit == "joint":
             return JointCredit(self.actor, self.compute)
@@ -98,10 +98,11 @@ class TwoPhaseLearner:
         return BatchReport(batch.env_steps, metrics, gradient_steps), batch
 
     def collect(self, steps: int, slots: int) -> Trajectories:
-        """Return about `steps` environment steps of whole episodes from `slots` slots."""
+        """Return about `steps` environment steps of whole episodes, played in at most `slots` slots."""
         explorer: Explorer = GaussianExplorer(self.actor)
-        if self.choose_designs is not None:
-            explorer = FixedDesigns(explorer, self.choose_designs(np.arange(slots)))
+        if self.choose_trial is not None:
+            trial = self.choose_trial(steps, slots)
+            explorer, slots = FixedDesigns(explorer, trial), len(trial.unit_designs)
         return self.collector.collect(explorer, steps, slots)
 
     def update(self, batch: Trajectories) -> dict[str, float]:

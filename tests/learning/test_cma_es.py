@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
+from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, reliability
 from codesign_bench.task import Floats
 
 pytestmark = pytest.mark.numeric
@@ -107,3 +107,29 @@ def test_population_and_first_spread_reach_pycma() -> None:
     evolution = make(EvolutionConfig(popsize=500, sigma0=0.02))
     assert evolution.ask().shape == (500, 5)
     assert evolution.ask().std() == pytest.approx(0.02, rel=0.1)
+
+
+def test_reliability_by_hand() -> None:
+    # Candidates differ by 1 on every instance, instances by 10: nothing is noise.
+    assert reliability(np.array([[0.0, 10.0], [1.0, 11.0], [2.0, 12.0]])) == 1.0
+    # Candidates' means 0 and 1, variance 1/2; residuals of 1/2 each. So 2 * 1/2 between, (4 * 1/4) / 1 within.
+    assert reliability(np.array([[-0.5, 0.5], [1.5, 0.5]])) == 0.0
+    # As above with residuals of 1/4: 1 - (4 / 16) / 1.
+    assert reliability(np.array([[-0.25, 0.25], [1.25, 0.75]])) == pytest.approx(0.75)
+
+
+def test_nothing_is_said_of_reliability_without_a_second_instance_or_a_difference() -> None:
+    assert np.isnan(reliability(np.zeros((3, 1))))
+    assert np.isnan(reliability(np.zeros((1, 3))))
+    assert np.isnan(reliability(np.array([[0.0, 1.0], [1.0, 0.0]])))
+
+
+def test_a_search_that_has_found_its_optimum_says_so() -> None:
+    evolution = Evolution(2, EvolutionConfig(popsize=8, sigma0=0.3), np.random.default_rng(0))
+    assert evolution.metrics() == {"generations": 0.0, "sigma": 0.3, "sigma_fraction": 1.0, "converged": 0.0}
+    for _ in range(400):
+        evolution.tell(-(evolution.ask() ** 2).sum(axis=1))
+        if evolution.converged:
+            break
+    assert evolution.converged
+    assert evolution.metrics()["sigma_fraction"] < 1e-3

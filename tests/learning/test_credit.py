@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,14 @@ import pytest
 import torch
 
 from codesign_bench.learning.credit import JointCredit, NoCredit, SeparateCredit, Steps
+from codesign_bench.learning.explorer import Trial
 from codesign_bench.learning.ppo import gaussian
+from codesign_bench.learning.ppo_method import PPOMethod
 from codesign_bench.learning.trajectories import Trajectories
 from codesign_bench.learning.two_phase import TwoPhaseLearner
-from codesign_bench.task import Floats, Singles, Slots
+from codesign_bench.method import Problem, load_method, method_names
+from codesign_bench.seeding import Streams
+from codesign_bench.task import Floats, Task
 from tolerances import of_log_prob, of_network, of_sum
 
 pytestmark = pytest.mark.numeric
@@ -22,9 +27,9 @@ MakeLearner = Callable[..., TwoPhaseLearner]
 BUDGET = 10_000
 
 
-def middle(slots: Slots) -> Singles:
-    """Choose the middle of the design space for every slot (b,)."""
-    return np.zeros((len(slots), 1), np.float32)
+def middle(steps: int, slots: int) -> Trial:
+    """Choose the middle of the design space for every slot."""
+    return Trial(np.zeros((slots, 1), np.float32))
 
 
 def assert_normalized_alike(found: torch.Tensor, values: Floats) -> None:
@@ -53,8 +58,8 @@ def make_constant(network: torch.nn.Module, value: float) -> None:
     [
         ({"design_credit": "joint"}, JointCredit),
         ({"design_credit": "separate"}, SeparateCredit),
-        ({"design_credit": "separate", "choose_designs": middle}, NoCredit),
-        ({"design_credit": "joint", "choose_designs": middle}, NoCredit),
+        ({"design_credit": "separate", "choose_trial": middle}, NoCredit),
+        ({"design_credit": "joint", "choose_trial": middle}, NoCredit),
     ],
 )
 def test_the_configuration_chooses_the_credit(
@@ -105,8 +110,23 @@ def test_separate_credit_gives_a_design_its_undiscounted_return(make_learner: Ma
     assert_normalized_alike(recorder.policies[1].advantage, returns)
 
 
+@pytest.mark.parametrize("name", [name for name in method_names() if issubclass(load_method(name), PPOMethod)])
+def test_a_control_update_alone_never_stops_the_design_update(name: str, reach: Task) -> None:
+    method_class: Any = load_method(name)
+    steps_of_designs = {**method_class.small(), "design_epochs": 3, "design_minibatch_size": 20}
+    # Control steps go as far as they like; design steps have no length, so all that moves the designer is the trunk.
+    settings = {"design_credit": "separate", "policy_learning_rate": 0.1, "kl_threshold": 1e9}
+    settings |= {"design_learning_rate": 0.0, "design_kl_threshold": 1e-6}
+    config = replace(method_class.config_class(), **(steps_of_designs | settings))
+    method = method_class(Problem(reach), config, Streams(0))
+    report = method.train(BUDGET)
+    assert report.metrics["kl"] > 1e3 * config.design_kl_threshold
+    assert report.metrics["design_steps"] >= config.design_epochs
+    assert report.metrics["design_kl"] < config.design_kl_threshold
+
+
 def test_designs_that_are_given_are_not_learned(make_learner: MakeLearner, recorder: Any) -> None:
-    learner = make_learner(fix_std=False, choose_designs=middle, loop=recorder)
+    learner = make_learner(fix_std=False, choose_trial=middle, loop=recorder)
     head = {name: tensor.clone() for name, tensor in learner.actor.named_parameters() if "design" in name}
     _, batch = learner.train(BUDGET)
     for name, tensor in learner.actor.named_parameters():

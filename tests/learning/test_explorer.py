@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from codesign_bench.learning.explorer import Explorer, FixedDesigns, Sample
+from codesign_bench.learning.explorer import Explorer, FixedDesigns, Sample, Trial
 from codesign_bench.learning.rollout import Collector
 from codesign_bench.method import Problem
 from codesign_bench.task import Singles, Slots, Task
@@ -71,10 +71,23 @@ def test_an_explorer_without_noise_moves_only_the_instances(collector: Collector
 
 def test_fixed_designs_belong_to_their_slots(collector: Collector) -> None:
     designs = np.linspace(-1.0, 1.0, 2 * SLOTS, dtype=np.float32)[:, None]
-    explorer = FixedDesigns(Loud(), designs)
+    explorer = FixedDesigns(Loud(), Trial(designs))
     batch = collector.collect(explorer, STEPS, SLOTS, np.random.default_rng(0), first_slot=SLOTS)
     layout = collector.problem.task.layout
     for slot, design in enumerate(designs[SLOTS:]):
         assert (batch.design[slot, batch.is_design[slot]] == design).all()
         controlling = batch.valid[slot] & ~batch.is_design[slot]
         assert (batch.observation[slot, controlling][:, layout.design] == design[0]).all()
+
+
+def test_chosen_instances_are_played_in_turn_by_every_slot(collector: Collector) -> None:
+    rng = np.random.default_rng(1)
+    instances = collector.problem.sample_instances(rng, 2 * SLOTS).reshape(SLOTS, 2, -1)
+    explorer = FixedDesigns(Loud(), Trial(np.zeros((SLOTS, 1), np.float32), instances))
+    batch = collector.collect(explorer, 4 * STEPS, SLOTS, np.random.default_rng(0))
+    goal = collector.problem.task.layout.goal
+    for slot in range(SLOTS):
+        met = batch.observation[slot, batch.is_design[slot]][:, goal]
+        assert len(met) > 2
+        expected = instances[slot, np.arange(len(met)) % 2, : met.shape[1]]
+        np.testing.assert_array_equal(met, expected.astype(np.float32))

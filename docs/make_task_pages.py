@@ -17,7 +17,7 @@ import re
 import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import pairwise
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,8 @@ SECTION = re.compile(r"^(\w[\w ]*)\n((?:    .*\n?|\n)+)", re.MULTILINE)
 SIBLING = re.compile(r"^from \.(_\w+) import", re.MULTILINE)
 """An import of a file that several tasks share."""
 WIDTH = 120
+LONG = 10
+"""So many numbered entries of an observation, or more, share one row."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -159,10 +161,26 @@ def _design(task: Task) -> Iterator[tuple[str, ...]]:
 def _observation(task: Task) -> Iterator[tuple[str, ...]]:
     layout = task.layout
     for part, space in ((layout.state, task.state_space), (layout.goal, task.goal_space)):
-        for index, entry in zip(range(part.start, part.stop), _entries(space), strict=True):
-            yield str(index), *_cells(entry)
+        start = part.start
+        for _, alike in groupby(_entries(space), _series):
+            entries = list(alike)
+            stop = start + len(entries)
+            if len(entries) < LONG:
+                yield from (
+                    (str(index), *_cells(entry)) for index, entry in zip(range(start, stop), entries, strict=True)
+                )
+            else:
+                _, *bounds = _cells(entries[0])
+                yield _span(slice(start, stop)), f"`{entries[0][0]}` to `{entries[-1][0]}`", *bounds
+            start = stop
     yield _span(layout.design), "the design, normalised; 0 before the design step", "-1", "1", ""
     yield _span(layout.phase), ", ".join(f"`{name}`" for name in Layout.PHASE_NAMES), "0", "1", ""
+
+
+def _series(entry: tuple[str, float, float, str]) -> tuple[str, float, float, str]:
+    """Return what entries have in common whose names differ by a number at their end alone."""
+    name, *bounds = entry
+    return (name.rstrip("0123456789"), *bounds)
 
 
 def _span(part: slice) -> str:

@@ -1,7 +1,7 @@
 """Scoop: a ladle of three links lifts a wanted number of balls out of a pile. Docstring of `Scoop` has the details.
 
 Shapes: `B` slots, `b` slots a call names, `N` = 40 balls, `P` piles, `I` = 3 instance (wanted balls, pile, shift),
-`D` = 5 design, `C` = 3 control.
+`D` = 5 design, `C` = 3 control, `M` = 24 places of the profile of a pile.
 """
 
 from __future__ import annotations
@@ -161,6 +161,13 @@ saw 10.3 m/s and 0.35 m."""
 SLOP: Annotated[float, Given("m", OURS)] = 0.02
 """Overlap of two bodies that the contact solver does not correct."""
 
+PROFILE_POINTS: Annotated[int, Given("1", OURS)] = 24
+"""At so many places the policies see how high the balls lie."""
+PROFILE_STEP: Annotated[float, Given("m", OURS)] = BALL_RADIUS
+"""Between neighbouring places: every ball lies over two of them."""
+PROFILE_START: Annotated[float, Given("m", OURS)] = -5.4
+"""x of the first place, from the first joint; the last one lies right of every tool's tip."""
+
 
 CONTROL = Box.of(
     velocity_x=(-MAX_SPEED, MAX_SPEED, "m/s"),
@@ -189,11 +196,16 @@ STATE = Box.of(
     joint_1_to_tip_x=(-10.0, 10.0, "m"),
     joint_1_to_tip_y=(-10.0, 10.0, "m"),
     **{f"wants_{number}": (0.0, 1.0, "") for number in range(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)},
+    **{f"surface_{place}": (FLOOR, 25.0, "m") for place in range(1, PROFILE_POINTS + 1)},
+    **{f"rise_{place}": (-MAX_BALL_SPEED, MAX_BALL_SPEED, "m/s") for place in range(1, PROFILE_POINTS + 1)},
 )
 JOINT, JOINT_VELOCITY = STATE.slice("joint_1_x", "joint_1_y"), STATE.slice("velocity_x", "velocity_y")
 TILT, ANGULAR_VELOCITY, LOWEST = STATE.index("tilt"), STATE.index("angular_velocity"), STATE.index("lowest_y")
 HELD, HELD_LESS_WANTED, HELD_FOR = (STATE.index(name) for name in ("held", "held_less_wanted", "held_steps"))
 SHAPE, WANTS = STATE.group("joint_1_to_"), STATE.group("wants_")
+SURFACE, RISE = STATE.group("surface_"), STATE.group("rise_")
+PROFILE_X = PROFILE_START + PROFILE_STEP * np.arange(PROFILE_POINTS)
+"""(M,) where the profile is taken, from the first joint, m."""
 
 BALL_BODIES, TOOL_BODY = slice(0, NUM_BALLS), NUM_BALLS
 """Rows of `PlanarSimulator.bodies`; the position of a tool is that of its first joint."""
@@ -204,8 +216,8 @@ class Scoop(Task):
 
     Seen from the side, a robot holds a ladle, a chain of three links: a handle and two more that curl up behind it. The
     ladle starts inside the pile. The hand moves it gently and tilts it a little, with limited force. It can hardly
-    shake or pour balls off, and the observation shows their number only when they are out of the reservoir. So the
-    shape of the tool determines how many balls stay on it: a deep or long ladle for many, a short one for few.
+    shake or pour balls off, and the observation counts them only once they are out. So the number of balls that stay on
+    the tool is decided by its shape and by the pile: a deep or long ladle for many, a short one for few.
 
     Action space
         Design, 5: lengths of the three links (m) and the two angles between them (rad) (paper). Control, 3: velocity of
@@ -213,18 +225,25 @@ class Scoop(Task):
         the tool keeps away from floor and walls (ours).
 
     Observation
-        State, 21: position of the first joint (m), tilt (rad), height of the tool's lowest point (m), velocity (m/s)
-        and angular velocity (rad/s); number of balls held out of the reservoir, the same minus the requested number,
-        control steps for which success has held; the displacements from the first joint to the second and to the tip
-        (m); and a one-hot code of the requested number. Goal, 1: the requested number. Then the design and the phase.
+        State, 69: position of the first joint (m), tilt (rad), height of the tool's lowest point (m), velocity (m/s) and
+        angular velocity (rad/s); number of balls held out of the reservoir, the same minus the requested number, control
+        steps for which success has held; the displacements from the first joint to the second and to the tip (m); a one-hot code of the
+        requested number; and the balls, as a profile of the pile: how high the topmost ball reaches (m) at evenly
+        spaced x that move with the first joint, and how fast this ball rises (m/s). Goal, 1: the requested number. Then
+        the design and the phase.
+
+        The paper's policies observe positions and velocities of the balls; the profile is our form of them. It does not
+        depend on the balls' order, is short, and shows the designer the pile around the place of the tool, before there
+        is one. Sorted positions and velocities are more than three times as long, tell hardly more of how many balls a
+        tool will bring, and jump where two balls change places in the order; the nearest balls change places as well.
 
     Design space
         Length = initial length (1 + ratio), angle = scale * ratio (our reading of the paper's table). The table has
         three angles; a chain of three links has two joints, and the third angle is not used.
 
     Goal space
-        Integer numbers of balls (paper), with equal probability (ours). An instance also has the index of the pile and
-        the shift of the tool's start to the left or right; policies do not observe these two.
+        Integer numbers of balls (paper), with equal probability (ours). An instance also holds which pile there is and how
+        far to the left or right the tool starts; these are no part of the goal, but the state shows them.
 
     Reward
         The change of a potential, plus the paper's slack (negative) and a bonus on success. The potential increases as
@@ -464,6 +483,7 @@ class _ScoopSimulator(PlanarSimulator):
         state[:, HELD_FOR] = self.met_steps[slots]
         state[:, SHAPE] = chain[:, 2:].reshape(len(slots), -1)
         state[:, WANTS] = wanted[:, None] == np.arange(GOAL_NUMBERS[0], GOAL_NUMBERS[1] + 1)
+        state[:, SURFACE], state[:, RISE] = profile(self.bodies[slots, BALL_BODIES], tool[:, 0])
         self.state[slots] = state
 
 
@@ -582,6 +602,25 @@ def above(places: Floats, chains: Floats) -> Booleans:
     over = (share > 0.0) & (share < 1.0) & (offset[..., 1] > share * link[..., 1])
     result: Booleans = np.any(over, axis=2)
     return result
+
+
+def profile(balls: Floats, middles: Floats) -> tuple[Floats, Floats]:
+    """Return how high the topmost of `balls` (b, N, 4) reaches around the x `middles` (b,), and how fast it rises.
+
+    Both are (b, M), at `PROFILE_X` from there, in m and m/s; where there is no ball, the floor, at rest.
+    """
+    along = (balls[..., 0] - middles[:, None] - PROFILE_START) / PROFILE_STEP
+    place = np.floor(along)[..., None] + (0.0, 1.0)  # A ball lies over the two places next to its middle.
+    square = BALL_RADIUS**2 - (PROFILE_STEP * (place - along[..., None])) ** 2
+    height = balls[..., 1, None] + np.sqrt(np.maximum(square, 0.0))
+    width = PROFILE_POINTS + 2  # Two more take the balls that lie beyond.
+    row = width * np.arange(len(balls))[:, None, None]
+    entry = row + np.clip(place, -1.0, PROFILE_POINTS).astype(np.intp) + 1
+    surface, rise = np.full(len(balls) * width, FLOOR), np.zeros(len(balls) * width)
+    np.maximum.at(surface, entry.ravel(), height.ravel())
+    topmost = height == surface[entry]
+    rise[entry[topmost]] = np.broadcast_to(balls[..., 3, None], entry.shape)[topmost]
+    return surface.reshape(-1, width)[:, 1:-1], rise.reshape(-1, width)[:, 1:-1]
 
 
 def rotated(points: Floats, angles: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """Scoop 3D: a scoop is lifted out of a reservoir with as many balls as are wanted. Docstring of `Scoop3D` has more.
 
 Shapes: `b` slots a call names, `I` = 2 instance (balls wanted, pile), `D` = 10 design, `C` = 6 control, `N` = 40 balls,
-`P` = 4 side plates (back, front, left, right), `K` = 6 boxes of a tool.
+`P` = 4 side plates (back, front, left, right), `K` = 6 boxes of a tool, `M` = 49 places of the profile of a pile.
 """
 
 from __future__ import annotations
@@ -160,6 +160,11 @@ SOLVER_ITERATIONS: Annotated[int, Given("1", OURS)] = 10
 CONTACT_CORRECTION: Annotated[float, Given("1", OURS)] = 0.5
 """Fraction of an overlap that a physics step removes."""
 
+PROFILE_POINTS: Annotated[int, Given("1", OURS)] = 7
+"""Along x and along y the policies see how high the balls lie at so many places."""
+PROFILE_STEP: Annotated[float, Given("m", OURS)] = 0.04
+"""Between neighbouring places: less than a ball is wide, more than its radius."""
+
 SIDES = ("back", "front", "left", "right")
 BACK = SIDES.index("back")
 SIDE_NODES = (1, 3, 4, 5)
@@ -207,12 +212,16 @@ STATE = Box.of(
     centre_y=(-0.2, 0.2, "m"),
     highest_ball=(0.0, 0.5, "m"),
     **{f"wants_{count}": (0.0, 1.0, "1") for count in range(WANTED[0], WANTED[1] + 1)},
+    **{f"surface_{place}": (0.0, 0.6, "m") for place in range(1, PROFILE_POINTS**2 + 1)},
+    **{f"rise_{place}": (-4.0, 4.0, "m/s") for place in range(1, PROFILE_POINTS**2 + 1)},
 )
 TOOL_PLACE, TOOL_TURN = STATE.group("tool_"), STATE.group("turn_")
 WAY_TO_LINE, BALLS_ABOVE, BALLS_HELD = (STATE.index(name) for name in ("way_to_line", "balls_above", "balls_held"))
 BALLS_MISSING, HELD_SHARE = STATE.index("balls_missing"), STATE.index("held_share")
 CLEAR_SHARE, CENTRE, HIGHEST_BALL = STATE.index("clear_share"), STATE.group("centre_"), STATE.index("highest_ball")
-WANTS = STATE.group("wants_")
+WANTS, SURFACE, RISE = STATE.group("wants_"), STATE.group("surface_"), STATE.group("rise_")
+PROFILE_START = -0.5 * PROFILE_STEP * (PROFILE_POINTS - 1)
+"""x and y of the first place, from the middle of the bottom plate, m; places go along y, then along x."""
 
 POSE_PLACE, POSE_TURN = slice(0, 3), slice(3, 6)
 """Axes of a tool's pose: x, y, z (m), and turns about them (rad)."""
@@ -246,11 +255,17 @@ class Scoop3D(Task):
         its rotations about x, y, z (rad) in a control step (paper; scale ours). Both are limited (ours).
 
     Observation
-        State, 22: position x, y, z (m) and rotations about x, y, z (rad) of the bottom plate, distance from its lowest
-        point up to the line (m); numbers of balls in or above the tool, held above the line, and missing; elapsed
-        fractions of the control steps to success and failure; mean position of the balls in or above the tool, in its
-        frame, x, y (m), and the height of the highest of them (m); and a one-hot code of the requested number. Goal, 1:
-        the requested number. Then the design and the phase.
+        State, 120: position x, y, z (m) and rotations about x, y, z (rad) of the bottom plate, distance from its lowest point up
+        to the line (m); numbers of balls in or above the tool, held above the line, and missing; elapsed
+        fractions of the control steps to success and failure; mean position of the balls in or above the tool, in its frame,
+        x, y (m), and the height of the highest (m); a one-hot code of the requested number; and the balls, as a profile
+        of the pile: how high the topmost ball reaches (m) at the places of a square grid that moves with the middle of
+        the bottom plate, and how fast this ball rises (m/s). Goal, 1: the requested number. Then the design and the phase.
+
+        The paper's policies observe positions and velocities of the balls; the profile is our form of them. It does not
+        depend on the balls' order, is shorter, and shows the designer the balls around the place of the tool, before
+        there is one. Sorted positions and velocities, and those of the nearest balls, jump where two balls change
+        places in the order.
 
     Design space
         Sizes are full widths, lengths and heights: we read the paper's table as half extents, PyBullet's convention;
@@ -259,8 +274,8 @@ class Scoop3D(Task):
         above the opening.
 
     Goal space
-        Integer numbers of balls (paper), with equal probability. An instance also has the index of a pile, which fixes
-        how the balls are placed and poured onto the tool. Policies do not observe it.
+        Integer numbers of balls (paper), with equal probability. An instance also holds the number of a pile: how the balls
+        are placed and poured on the tool; it is no part of the goal, but the state shows how they lie.
 
     Reward
         The change of a potential, plus the paper's slack (negative) and the paper's bonus on success. The potential
@@ -386,6 +401,7 @@ class _ScoopSimulator(BulletSimulator):
         self.state[slots, TOOL_PLACE] = TOOL_START
         self.state[slots, BALLS_MISSING] = self.wanted[slots]
         self.state[slots, WANTS] = np.arange(WANTED[0], WANTED[1] + 1) == self.wanted[slots, None]
+        self._write_profile(slots, np.tile(TOOL_START[:2], (len(slots), 1)))
 
     def build_scene(self, slot: int) -> list[int]:
         """Build floor and walls, and put the balls next to each other on the floor."""
@@ -532,6 +548,7 @@ class _ScoopSimulator(BulletSimulator):
     def _observe(self, slots: Slots) -> tuple[Floats, Floats, Booleans, Floats]:
         """Read the worlds; return balls above and held, whether tools are clear, and the lifted fraction, (b,) each."""
         pose, balls = self.read_tools(slots), self.read_bodies(slots)[:, :, PLACE]
+        self._write_profile(slots, pose[:, :2])
         matrices = turn_matrices(pose[:, POSE_TURN])
         local = (balls - pose[:, None, POSE_PLACE]) @ matrices
         # Speed from the change of position in the tool's own frame: the motion of the tool, its rotation included,
@@ -555,6 +572,11 @@ class _ScoopSimulator(BulletSimulator):
         state[slots, HIGHEST_BALL] = (local[:, :, 2] * over).max(axis=1)
         raised = np.clip(1.0 - way / (LINE - FLOOR_CLEARANCE), 0.0, 1.0)
         return above, held, clear, raised
+
+    def _write_profile(self, slots: Slots, middles: Floats) -> None:
+        balls = self.bodies[slots]
+        surface, rise = profile(balls[..., PLACE], balls[..., VELOCITY.start + 2], middles)
+        self.state[slots, SURFACE], self.state[slots, RISE] = surface, rise
 
 
 def lay_balls(rng: np.random.Generator) -> Floats:
@@ -643,6 +665,27 @@ def touching(design: Floats, balls: Floats) -> Booleans:
     beyond = beyond_sides(design[None], balls[None])[0]
     near: Booleans = (beyond < 2.0 * HALF_THICKNESS + BALL_RADIUS + POUR_GAP).all(axis=1)
     return near
+
+
+def profile(places: Floats, velocities: Floats, middles: Floats) -> tuple[Floats, Floats]:
+    """Return how high the topmost ball reaches around x and y `middles` (b, 2), (b, M), m, and how fast it rises, m/s.
+
+    Balls are at `places` (b, N, 3) and rise by `velocities` (b, N). Where there is no ball, the floor, at rest.
+    """
+    along = (places[..., :2] - middles[:, None] - PROFILE_START) / PROFILE_STEP
+    # A ball lies over some of the four places around its middle.
+    near = np.floor(along)[:, :, None] + [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)]
+    square = BALL_RADIUS**2 - ((PROFILE_STEP * (near - along[:, :, None])) ** 2).sum(axis=-1)
+    over = (square > 0.0) & ((near >= 0.0) & (near < PROFILE_POINTS)).all(axis=-1)
+    slot, ball, _ = np.nonzero(over)
+    height = places[slot, ball, 2] + np.sqrt(square[over])
+    place = (PROFILE_POINTS * near[over][:, 0] + near[over][:, 1]).astype(np.intp)
+    surface = np.zeros((len(places), PROFILE_POINTS**2))
+    rise = np.zeros_like(surface)
+    np.maximum.at(surface, (slot, place), height)
+    topmost = height == surface[slot, place]
+    rise[slot[topmost], place[topmost]] = velocities[slot, ball][topmost]
+    return surface, rise
 
 
 def turn_matrices(turns: Floats) -> Floats:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from codesign_bench.cell.variant import DEFAULT
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import StoredCell, find_cells
-from codesign_bench.storage.policies import policy_of
+from codesign_bench.storage.policies import misfit, policy_of
 from codesign_bench.task import load_task
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.play import designed
@@ -30,7 +30,7 @@ def timing_frame(results: Path) -> pd.DataFrame:
 
     Columns: task, method, label, seed, profile, env_steps, train_s (without evaluation), cores (of the
     cell), cpu, inference_s (median time of one control step's policy call; one seed per task and method is timed, NaN
-    elsewhere).
+    elsewhere and where there is no policy that fits the task's observation).
 
     Raises:
         UserError: there is no such cell.
@@ -44,6 +44,9 @@ def timing_frame(results: Path) -> pd.DataFrame:
         if not cell.is_done or record.variant != DEFAULT:
             continue
         pair = (record.task, record.method)
+        is_timed = pair not in timed and cell.has_policy and not misfit(cell)
+        if is_timed:
+            timed.add(pair)
         rows.append(
             {
                 "task": record.task,
@@ -55,10 +58,9 @@ def timing_frame(results: Path) -> pd.DataFrame:
                 "train_s": record.timings.train_s,
                 "cores": record.threads,
                 "cpu": record.host["cpu"],
-                "inference_s": float("nan") if pair in timed else inference_seconds(cell),
+                "inference_s": inference_seconds(cell) if is_timed else float("nan"),
             }
         )
-        timed.add(pair)
     if not rows:
         raise UserError(f"no finished cell in '{results}' yet; create some with: codesign-bench run --out {results}")
     return pd.DataFrame(rows)

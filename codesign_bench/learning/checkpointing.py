@@ -8,6 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from codesign_bench.errors import OtherObservationError
+from codesign_bench.learning.networks import RunningNorm
 from codesign_bench.method import Array
 
 Modules = Mapping[str, nn.Module]
@@ -31,7 +33,8 @@ def load_learner_arrays(modules: Modules, optimizers: Optimizers, arrays: Mappin
     """Restore the arrays that `learner_arrays` returned.
 
     Raises:
-        RuntimeError: names or shapes differ from the modules'.
+        OtherObservationError: a module normalises another number of observed entries.
+        RuntimeError: names or shapes differ from the modules' otherwise.
     """
     for name, module in modules.items():
         load_module_arrays(module, _below(f"{name}.", arrays))
@@ -48,8 +51,15 @@ def load_module_arrays(module: nn.Module, arrays: Mapping[str, Array]) -> None:
     """Restore the arrays that `module_arrays` returned.
 
     Raises:
-        RuntimeError: names or shapes differ from the module's.
+        OtherObservationError: the module normalises another number of observed entries.
+        RuntimeError: names or shapes differ from the module's otherwise.
     """
+    for name, part in module.named_modules():
+        stored = arrays.get(f"{name}.mean" if name else "mean")
+        if isinstance(part, RunningNorm) and stored is not None and len(stored) != len(part.mean):
+            raise OtherObservationError(
+                f"trained with another observation: {len(stored)} entries of state and goal, now {len(part.mean)}"
+            )
     module.load_state_dict({name: torch.from_numpy(np.array(array)) for name, array in arrays.items()})
 
 

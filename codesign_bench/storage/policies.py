@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from codesign_bench.config.resolve import method_config
-from codesign_bench.errors import UserError
+from codesign_bench.errors import OtherObservationError, UserError
 from codesign_bench.method import Array, Policy, load_method
 from codesign_bench.storage.cells import StoredCell, open_cell
 from codesign_bench.storage.checkpoint import load_arrays, save_arrays
@@ -32,16 +32,32 @@ def policy_of(cell: StoredCell) -> Policy:
     """Return the final policy of a cell.
 
     Raises:
+        OtherObservationError: it was trained with another observation than its task gives now.
         UserError: it is not finished, or its files are damaged or incompatible with this version.
     """
-    tensors, record = policy_tensors(cell), cell.record
+    tensors, record, path = policy_tensors(cell), cell.record, cell.folder / POLICY_FILE
     method_class = load_method(record.method)
     config = method_config(method_class.config_class, record.config.method)
     try:
         return method_class.make_policy(load_task(record.task), config, tensors)
+    except OtherObservationError as error:
+        again = f"codesign-bench run --task {record.task} --method {record.method}"
+        raise OtherObservationError(f"{path} was {error}; train it again, into another folder: {again}") from error
     except (KeyError, ValueError, RuntimeError) as error:
-        path = cell.folder / POLICY_FILE
         raise UserError(f"{path} is incompatible with method '{record.method}' of this version: {error}") from error
+
+
+def misfit(cell: StoredCell) -> str:
+    """Return why a cell's final policy cannot act on its task as it is now, or "" if it can.
+
+    Raises:
+        UserError: the cell is not finished, or its files are damaged or incompatible with this version for another reason.
+    """
+    try:
+        policy_of(cell)
+    except OtherObservationError as error:
+        return str(error)
+    return ""
 
 
 def policy_and_task(folder: Path, name: str | None) -> tuple[Policy, Task]:

@@ -10,6 +10,7 @@ import pytest
 from builders import VERSION_0_1_0, store_cell
 from codesign_bench.cell.variant import Variant
 from codesign_bench.errors import UserError
+from codesign_bench.evaluation import timing
 from codesign_bench.evaluation.timing import inference_seconds, timing_frame
 from codesign_bench.storage.cells import open_cell
 from codesign_bench.storage.records import RUNNING, CellRecord
@@ -43,6 +44,12 @@ def test_one_seed_of_each_task_and_method_is_timed(results: Path) -> None:
     frame = timing_frame(results)
     assert frame["inference_s"].notna().tolist() == [True, False, True, False]
     assert frame["inference_s"].dropna().between(1e-7, 1.0).all()
+
+
+def test_a_policy_that_fits_its_task_no_more_is_not_timed(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(timing, "misfit", lambda cell: "another observation" if cell.record.seed == 0 else "")
+    frame = timing_frame(results)
+    assert frame["inference_s"].notna().tolist() == [False, True, False, True]
 
 
 def test_a_call_of_a_policy_takes_some_time(results: Path) -> None:

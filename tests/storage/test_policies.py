@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from builders import store_cell, sweep, toy_cells
+from builders import VERSION_0_1_0, store_cell, sweep, toy_cells
 from codesign_bench import load_policy
-from codesign_bench.errors import UserError
-from codesign_bench.storage.policies import policy_and_task
+from codesign_bench.errors import OtherObservationError, UserError
+from codesign_bench.storage.cells import open_cell
+from codesign_bench.storage.policies import misfit, policy_and_task
+from codesign_bench.task import Box, load_task
 
 
 @pytest.mark.parametrize(("status", "named"), [("done", "policy file is missing"), ("running", "'interrupted'")])
@@ -40,3 +42,18 @@ def test_the_policy_on_disk_is_the_one_that_was_judged(tmp_path: Path) -> None:
     damaged.write_bytes(damaged.read_bytes()[:-3])
     with pytest.raises(UserError, match=r"policy\.safetensors"):
         load_policy(folder)
+
+
+def test_a_policy_that_was_trained_with_another_observation_says_so_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cells = [open_cell(VERSION_0_1_0 / "push" / method / "default" / "seed-00") for method in ("gnn_ppo", "cma_es")]
+    assert [misfit(cell) for cell in cells] == ["", ""]
+    space, task_class = load_task("push").state_space, type(load_task("push"))
+    entries = dict(zip(space.names, zip(space.low, space.high, space.units, strict=True), strict=True))
+    monkeypatch.setattr(task_class, "state_space", Box.of(**entries, wind=(-1.0, 1.0, "m/s")))
+    with pytest.raises(OtherObservationError, match=r"policy\.safetensors was trained with another obs.*again") as told:
+        load_policy(cells[0].folder)
+    assert "\n" not in str(told.value)
+    assert misfit(cells[0]) == str(told.value)
+    assert misfit(cells[1]) == "", "an open-loop plan observes nothing but the time"

@@ -6,7 +6,7 @@ Nothing here depends on a tuned number: all of them are read from the task's mod
 from __future__ import annotations
 
 from itertools import product
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pymunk
@@ -98,6 +98,89 @@ def test_distances_from_a_chain_by_hand() -> None:
 def test_turning_points_by_hand() -> None:
     points = np.array([[[1.0, 0.0], [0.0, 2.0]]])
     np.testing.assert_allclose(scoop.rotated(points, np.array([0.5 * np.pi])), [[[0.0, 1.0], [-2.0, 0.0]]], atol=1e-12)
+
+
+def profile_by_hand(balls: Floats, middle: float) -> tuple[list[float], list[float]]:
+    """Return what `profile` should say of the balls (N, 4) of one slot, place by place and ball by ball."""
+    surface, rise = [], []
+    for x in middle + scoop.PROFILE_X:
+        reached = [
+            (float(y + np.sqrt(scoop.BALL_RADIUS**2 - (x - ball_x) ** 2)), float(speed))
+            for ball_x, y, _, speed in balls
+            if abs(x - ball_x) < scoop.BALL_RADIUS
+        ]
+        height, speed = max(reached, default=(scoop.FLOOR, 0.0))
+        surface.append(height)
+        rise.append(speed)
+    return surface, rise
+
+
+def test_the_profile_of_two_balls_by_hand() -> None:
+    radius, far = scoop.BALL_RADIUS, 1e3
+    balls = np.zeros((1, scoop.NUM_BALLS, 4))
+    balls[0, :, :2] = far, far  # Out of sight; nothing of them may show at the ends.
+    balls[0, 0] = scoop.PROFILE_X[4] - 0.2 * radius, 11.0, 3.0, -0.5  # Over the places 3 and 4.
+    balls[0, 1] = scoop.PROFILE_X[4] + 0.4 * radius, 10.7, 3.0, 0.25  # Over the places 4 and 5, and lower.
+    surface, rise = scoop.profile(balls, np.zeros(1))
+    reached = {3: 11.0 + 0.6 * radius, 4: 11.0 + np.sqrt(0.96) * radius, 5: 10.7 + 0.8 * radius}
+    assert surface[0] == pytest.approx([reached.get(place, scoop.FLOOR) for place in range(scoop.PROFILE_POINTS)])
+    assert rise[0] == pytest.approx(
+        [{3: -0.5, 4: -0.5, 5: 0.25}.get(place, 0.0) for place in range(scoop.PROFILE_POINTS)]
+    )
+
+
+def test_the_state_shows_the_pile_before_there_is_a_tool_and_balls_in_motion_after() -> None:
+    episodes, slots = Episodes(load_task("scoop"), 3), np.arange(3)
+    episodes.begin(slots, np.vstack([instance(2), instance(4, pile=7, shift=-0.4), instance(7, pile=19, shift=0.3)]))
+    seen, simulator = load_task("scoop").layout.split(episodes.observation), cast("Any", episodes.simulator)
+    rng = np.random.default_rng(4)
+    for phase in ("design", "control", "control"):
+        for slot in slots:
+            balls, middle = simulator.bodies[slot, : scoop.NUM_BALLS], simulator.bodies[slot, scoop.NUM_BALLS, 0]
+            surface, rise = profile_by_hand(balls, middle)
+            np.testing.assert_allclose(seen.state[slot, scoop.SURFACE], surface, atol=1e-5)
+            np.testing.assert_allclose(seen.state[slot, scoop.RISE], rise, atol=1e-5)
+            if phase == "design":
+                pile = scoop.settled_piles()[(0, 7, 19)[slot]]
+                assert np.array_equal(balls[:, :2], pile)
+                assert max(surface) == pytest.approx(pile[:, 1].max() + scoop.BALL_RADIUS, abs=0.4 * scoop.BALL_RADIUS)
+                assert not any(rise)
+        if phase == "design":
+            episodes.design(slots, rng.uniform(-1.0, 1.0, size=(3, 5)))
+        for _ in range(3):
+            episodes.control(slots, rng.uniform(-1.0, 1.0, size=(3, 3)))
+    assert np.abs(seen.state[:, scoop.RISE]).max() > 0.0
+
+
+def test_the_profile_does_not_depend_on_the_balls_order_and_moves_with_the_tool() -> None:
+    balls = np.zeros((1, scoop.NUM_BALLS, 4))
+    balls[0, :, :2] = scoop.settled_piles()[5]
+    balls[..., 3] = np.arange(scoop.NUM_BALLS)
+    middle = scoop.TOOL_START[:1]
+    before = scoop.profile(balls, middle)
+    np.testing.assert_array_equal(scoop.profile(balls[:, ::-1], middle), before)
+    np.testing.assert_allclose(scoop.profile(balls + np.array([2.0, 0.0, 0.0, 0.0]), middle + 2.0), before, atol=1e-9)
+
+
+def test_the_profile_reaches_over_every_tool() -> None:
+    space = load_task("scoop").design_space
+    points = scoop.chain_points(space.from_unit(many_designs(200)), scoop.FIRST_LINK_ANGLE)
+    x = (points - points[:, 1:2])[..., 0]
+    assert scoop.PROFILE_X[0] <= x.min()
+    assert x.max() <= scoop.PROFILE_X[-1]
+
+
+def test_balls_thrown_anywhere_leave_the_observation_in_its_bounds() -> None:
+    episodes = started(instance(3), TRAY)
+    simulator: Any = episodes.simulator
+    low, high = load_task("scoop").state_space.bounds
+    for place, velocity in (((15.0, 500.0), (0.0, 300.0)), ((15.0, 9.5), (0.0, -300.0)), ((15.0, -80.0), (90.0, 0.0))):
+        for ball in simulator.balls[0].bodies:
+            ball.position, ball.velocity = place, velocity
+        episodes.control(SLOT, IDLE)
+        state = load_task("scoop").layout.split(episodes.observation).state[0]
+        assert np.isfinite(state).all()
+        assert ((low - 1e-4 <= state) & (state <= high + 1e-4)).all()
 
 
 def test_piles_are_different_nearly_at_rest_and_inside_the_reservoir() -> None:

@@ -102,6 +102,92 @@ def test_the_lowest_point_of_a_tilted_plate_by_hand() -> None:
     assert scoop.drop(design, about_z)[0] == pytest.approx(thick)
 
 
+def profile_by_hand(places: Floats, velocities: Floats, middle: Floats) -> tuple[list[float], list[float]]:
+    """Return what `profile` should say of the balls (N, 3), (N,) of one slot, place by place and ball by ball."""
+    offsets = scoop.PROFILE_STEP * (np.arange(scoop.PROFILE_POINTS) - 0.5 * (scoop.PROFILE_POINTS - 1))
+    surface, rise = [], []
+    for offset in product(offsets, offsets):
+        distances = np.linalg.norm(places[:, :2] - middle - offset, axis=1)
+        reached = [
+            (float(place[2] + np.sqrt(scoop.BALL_RADIUS**2 - distance**2)), float(velocity))
+            for place, velocity, distance in zip(places, velocities, distances, strict=True)
+            if distance < scoop.BALL_RADIUS
+        ]
+        height, velocity = max(reached, default=(0.0, 0.0))
+        surface.append(height)
+        rise.append(velocity)
+    return surface, rise
+
+
+def test_the_profile_of_two_balls_by_hand() -> None:
+    radius, step, side = scoop.BALL_RADIUS, scoop.PROFILE_STEP, scoop.PROFILE_POINTS
+    middle = side // 2
+    places = np.full((1, scoop.BALLS, 3), 9.0)  # Out of sight; nothing of them may show at the edges.
+    places[0, 0], places[0, 1] = (0.3, 0.1, 0.05), (0.3 + step, 0.1 - 0.5 * step, 0.2)
+    surface, rise = scoop.profile(places, np.arange(scoop.BALLS)[None] + 0.5, np.array([[0.3, 0.1]]))
+    across = 0.2 + np.sqrt(radius**2 - (0.5 * step) ** 2)
+    expected, rising = np.zeros((side, side)), np.zeros((side, side))
+    expected[middle, middle], rising[middle, middle] = 0.05 + radius, 0.5
+    expected[middle + 1, [middle - 1, middle]], rising[middle + 1, [middle - 1, middle]] = across, 1.5
+    np.testing.assert_allclose(surface[0].reshape(side, side), expected)
+    np.testing.assert_allclose(rise[0].reshape(side, side), rising)
+
+
+def test_the_state_shows_the_balls_before_there_is_a_tool_and_in_motion_after() -> None:
+    task, rng, slots = load_task("scoop_3d"), np.random.default_rng(4), np.arange(3)
+    episodes = Episodes(task, 3)
+    simulator: Any = episodes.simulator
+    episodes.begin(slots, task.sample_instances(rng, 3))
+    seen = task.layout.split(episodes.observation).state
+    for phase in ("design", "control", "control"):
+        for slot in slots:
+            middle = scoop.TOOL_START[:2] if phase == "design" else simulator.pose[slot, :2]
+            balls = simulator.bodies[slot]
+            surface, rise = profile_by_hand(balls[:, :3], balls[:, 9], middle)
+            np.testing.assert_allclose(seen[slot, scoop.SURFACE], surface, atol=1e-6)
+            np.testing.assert_allclose(seen[slot, scoop.RISE], rise, atol=1e-6)
+            if phase == "design":
+                assert 0.3 * scoop.PROFILE_POINTS**2 < np.count_nonzero(surface) < 0.7 * scoop.PROFILE_POINTS**2
+                assert max(surface) <= 2.0 * scoop.BALL_RADIUS
+                assert not any(rise)
+        if phase == "design":
+            episodes.design(slots, rng.uniform(-1.0, 1.0, size=(3, 10)))
+        for _ in range(3):
+            episodes.control(slots, rng.uniform(-1.0, 1.0, size=(3, 6)))
+    assert np.abs(seen[:, scoop.RISE]).max() > 0.0
+
+
+def test_the_profile_does_not_depend_on_the_balls_order_and_moves_with_the_tool() -> None:
+    places, middle = scoop.lay_balls(np.random.default_rng(1))[None], np.array([scoop.TOOL_START[:2]])
+    rises = np.arange(float(scoop.BALLS))[None]
+    before = scoop.profile(places, rises, middle)
+    np.testing.assert_array_equal(scoop.profile(places[:, ::-1], rises[:, ::-1], middle), before)
+    np.testing.assert_allclose(
+        scoop.profile(places + np.array([0.1, 0.2, 0.0]), rises, middle + np.array([0.1, 0.2])), before
+    )
+
+
+def test_the_profile_reaches_over_every_bottom_plate_and_no_ball_hides_between_its_places() -> None:
+    reach = 0.5 * scoop.PROFILE_STEP * (scoop.PROFILE_POINTS - 1)
+    assert reach > 0.5 * scoop.DESIGN.bounds[1][scoop.BOTTOM].max() + scoop.BALL_RADIUS
+    assert np.sqrt(0.5) * scoop.PROFILE_STEP < scoop.BALL_RADIUS
+
+
+def test_balls_thrown_anywhere_leave_the_observation_in_its_bounds() -> None:
+    episodes = started(3, tool_for(3))
+    simulator: Any = episodes.simulator
+    low, high = load_task("scoop_3d").state_space.bounds
+    for height, speed in ((5.0, 30.0), (-3.0, -30.0)):
+        for ball in simulator.moving[0]:
+            world = simulator.worlds[0]
+            pybullet.resetBasePositionAndOrientation(ball, [0.0, 0.05, height], scoop.LEVEL, physicsClientId=world)
+            pybullet.resetBaseVelocity(ball, [0.0, 0.0, speed], physicsClientId=world)
+        episodes.control(SLOT, 0.0 * LIFT)
+        state = load_task("scoop_3d").layout.split(episodes.observation).state[0]
+        assert np.isfinite(state).all()
+        assert ((low - 1e-4 <= state) & (state <= high + 1e-4)).all()
+
+
 def test_instances_are_whole_numbers_of_balls_all_alike() -> None:
     wanted = load_task("scoop_3d").sample_instances(np.random.default_rng(0), 7_000)[:, scoop.BALLS_WANTED]
     counts = np.array([(wanted == number).sum() for number in range(scoop.WANTED[0], scoop.WANTED[1] + 1)])

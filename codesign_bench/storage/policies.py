@@ -23,7 +23,8 @@ def load_policy(folder: str | Path) -> Policy:
     """Return the final policy of the cell in `folder`; `design(observation)` and `act(observation)` take its means.
 
     Raises:
-        UserError: the folder holds no finished cell, or its files are damaged or do not fit this version.
+        UserError: the folder holds no finished cell, its files are damaged or do not fit this version, or its task has
+            changed since.
     """
     return policy_of(open_cell(folder))
 
@@ -32,7 +33,7 @@ def policy_of(cell: StoredCell) -> Policy:
     """Return the final policy of a cell.
 
     Raises:
-        UserError: it is not finished, or its files are damaged or do not fit this version.
+        UserError: it is not finished, its files are damaged or do not fit this version, or its task has changed since.
     """
     tensors, record = policy_tensors(cell), cell.record
     method_class = load_method(record.method)
@@ -48,7 +49,7 @@ def policy_and_task(folder: Path, name: str | None) -> tuple[Policy, Task]:
     """Return the final policy of the cell in `folder` and its task.
 
     Raises:
-        UserError: it is not a finished cell, or was trained on another task than `name`.
+        UserError: it is not a finished cell, or was trained on another task than `name` or another version of it.
     """
     cell = open_cell(folder)
     trained_on = cell.record.task
@@ -61,8 +62,14 @@ def policy_tensors(cell: StoredCell) -> dict[str, Array]:
     """Return the tensors of a cell's final policy.
 
     Raises:
-        UserError: the cell is not finished, or the file is damaged.
+        UserError: the cell is not finished, the file is damaged, or the task has changed since.
     """
+    record, now = cell.record, load_task(cell.record.task).version
+    if record.task_version != now:
+        raise UserError(
+            f"'{cell.folder}' was trained on version {record.task_version} of task '{record.task}', which is now at "
+            f"version {now}: train it again, or use the release that made it"
+        )
     path = cell.folder / POLICY_FILE
     try:
         return load_arrays(path)[0]

@@ -41,6 +41,8 @@ class Task(ABC):
     """Its name, which is its file's name."""
     title: ClassVar[str]
     """Its name in figures."""
+    version: ClassVar[int] = 1
+    """Raised whenever its results can no longer be compared with earlier ones: another scene, reward or instances."""
     horizon: ClassVar[int]
     """Control steps until the time limit."""
     control_period: ClassVar[float]

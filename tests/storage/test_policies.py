@@ -10,7 +10,9 @@ import pytest
 from builders import store_cell, sweep, toy_cells
 from codesign_bench import load_policy
 from codesign_bench.errors import UserError
+from codesign_bench.storage.cells import open_cell
 from codesign_bench.storage.policies import policy_and_task
+from toy import ToyReach
 
 
 @pytest.mark.parametrize(("status", "named"), [("done", "policy file is missing"), ("running", "'interrupted'")])
@@ -36,6 +38,24 @@ def test_the_policy_on_disk_is_the_one_that_was_judged(tmp_path: Path) -> None:
     assert policy_and_task(folder, "toy_reach")[1].name == "toy_reach"
     with pytest.raises(UserError, match="trained on 'toy_reach', not on 'push'"):
         policy_and_task(folder, "push")
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_policy_of_another_version_of_its_task_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (cell,) = toy_cells()
+    sweep([cell], tmp_path)
+    folder = cell.folder(tmp_path)
+    assert open_cell(folder).record.task_version == 1
+    monkeypatch.setattr(ToyReach, "version", 2)
+    with pytest.raises(UserError, match="trained on version 1 of task 'toy_reach', which is now at version 2"):
+        load_policy(folder)
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_damaged_policy_is_named(tmp_path: Path) -> None:
+    (cell,) = toy_cells()
+    sweep([cell], tmp_path)
+    folder = cell.folder(tmp_path)
     damaged = folder / "policy.safetensors"
     damaged.write_bytes(damaged.read_bytes()[:-3])
     with pytest.raises(UserError, match=r"policy\.safetensors"):

@@ -68,32 +68,31 @@ MAX_ACCELERATION: Annotated[float, Given("m/s^2", OURS)] = 10.0
 
 NUM_BALLS: Annotated[int, Given("balls", 'paper, appendix "Environment Details"')] = 3
 """Thrown in an episode."""
-BALL_RADIUS: Annotated[float, Given("m", OURS)] = 0.5
+BALL_RADIUS: Annotated[float, Given("m", OURS)] = 0.4
 """Of a ball."""
 GRAVITY: Annotated[float, Given("m/s^2", OURS)] = 8.0
 """Of the scene."""
-LINK_FRICTION: Annotated[float, Given("1", OURS)] = 0.7
+LINK_FRICTION: Annotated[float, Given("1", OURS)] = 0.4
 """Between link and ball. The first link has none, so that no ball balances on the hand."""
 BALL_FRICTION: Annotated[float, Given("1", OURS)] = 0.04
 """Between two balls: they do not stay piled up as a tower."""
 
-LANDING_DISTANCE: Annotated[tuple[float, float], Given("m", OURS)] = (1.0, 5.0)
+LANDING_DISTANCE: Annotated[tuple[float, float], Given("m", OURS)] = (1.0, 4.0)
 """Smallest and largest distance from the hand's start of the place where the balls come down."""
-LANDING_SPREAD: Annotated[float, Given("m", OURS)] = 1.2
+LANDING_SPREAD: Annotated[float, Given("m", OURS)] = 2.2
 """Largest distance of a ball's own place from that place."""
-START_HEIGHTS: Annotated[tuple[tuple[float, float], ...], Given("m", OURS)] = (
-    (16.5, 17.0),
-    (18.25, 18.75),
-    (20.0, 20.5),
-)
-"""Lowest and highest start of each ball: above every tool, and so far apart that balls do not meet in the air."""
+START_HEIGHTS: Annotated[tuple[tuple[float, float], ...], Given("m", OURS)] = ((16.5, 17.0), (19.5, 20.0), (22.5, 23.0))
+"""Lowest and highest start of each ball: above every tool, and so far apart that balls do not meet in the air.
+
+The hand has time to move from one to the next.
+"""
 THROW_SPEED: Annotated[float, Given("m/s", OURS)] = 3.0
 """Largest speed along x at which a ball is thrown."""
 
 SLOW: Annotated[float, Given("m/s", OURS)] = 0.5
 """A ball lies still on the tool if it is slower than this, as seen from the tool."""
-PILE_HEIGHT: Annotated[float, Given("m", OURS)] = 2.5
-"""A ball whose centre is less than this above a link lies on it or on balls that lie on it."""
+REST_HEIGHT: Annotated[float, Given("m", OURS)] = 0.9
+"""A ball whose centre is less than this above a link lies on the link itself, not on other balls."""
 HOLD_STEPS: Annotated[int, Given("control steps", OURS)] = 15
 """A ball is caught once it has been held for so long in a row."""
 SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
@@ -111,7 +110,7 @@ HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 15
 STEPS_PER_CONTROL: Annotated[int, Given("physics steps", OURS, "control_steps_per_action")] = 4
 """In a control step."""
 PHYSICS_PERIOD: Annotated[float, Given("s", OURS)] = 1.0 / 120.0
-"""Of a physics step: the fastest ball moves a quarter of its radius."""
+"""Of a physics step: a ball that hits a tool moves less than a third of its radius."""
 CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
 
 
@@ -180,8 +179,8 @@ class CatchBalls(Task):
 
     Reward
         The change in the share of balls that are held, less the paper's slack, and a bonus on success. A ball is held
-        if its centre is a little above a link and below the hand, and if it is slow as seen from the tool. What is let
-        go again is taken back, so nothing is earned twice. An episode's return is below 2.
+        if it lies on a link, below the hand, and is slow as seen from the tool; a ball that lies on other balls is not.
+        What is let go again is taken back, so nothing is earned twice. An episode's return is below 2.
 
     Starting state
         The hand at rest where the paper's table has it; the balls above every tool, each at its own height (ours).
@@ -193,6 +192,7 @@ class CatchBalls(Task):
 
     name = "catch_balls"
     title = "Catch balls"
+    version = 2
     scene: ClassVar = {**CHAIN_SCENE, **constants(__name__)}
     horizon = HORIZON
     control_period = CLOCK.control_period
@@ -205,7 +205,7 @@ class CatchBalls(Task):
     state_space = STATE
     reward_terms: ClassVar = {
         "progress": f"(k_now - k_before) / {NUM_BALLS}, k the number of balls held: above a link by less than "
-        f"{PILE_HEIGHT:g} m, below the hand, and slower than {SLOW:g} m/s as seen from the tool",
+        f"{REST_HEIGHT:g} m, below the hand, and slower than {SLOW:g} m/s as seen from the tool",
         "slack": f"{SLACK_REWARD:g}",
         "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
     }
@@ -214,8 +214,8 @@ class CatchBalls(Task):
     failure_condition = "a ball has fallen below the tool, and every other one has, too, or is caught"
 
     run_settings: ClassVar[ByProfile] = {
-        "quick": {"steps": 400_000, "tradeoff_scale": 0.01},
-        "laptop": {"tradeoff_scale": 0.01},
+        "quick": {"steps": 400_000, "tradeoff_scale": 0.02},
+        "laptop": {"tradeoff_scale": 0.02},
     }
     outcome = Quantity("balls held", "balls")
     soundness = Soundness(
@@ -275,7 +275,7 @@ class CatchBalls(Task):
 class _CatchSimulator(PlanarSimulator):
     """Three balls and a kinematic tool per slot, between a floor and two walls that keep what was missed in sight."""
 
-    view = View(x=(WALLS[0] - 0.5, WALLS[1] + 0.5), y=(FLOOR - 1.0, FLOOR + 28.0))
+    view = View(x=(WALLS[0] - 0.5, WALLS[1] + 0.5), y=(FLOOR - 1.0, FLOOR + 31.0))
 
     def __init__(self, num_slots: int, state_size: int, clock: Clock) -> None:
         super().__init__(num_slots, state_size, num_bodies=NUM_BALLS + 1, clock=clock)
@@ -387,15 +387,15 @@ def throws(instances: Floats) -> tuple[Floats, Floats]:
 def is_held(points: Floats, balls: Floats, velocity: Floats) -> Booleans:
     """Return which balls (b, K) are held by tools with chain `points` (b, 4, 2).
 
-    `balls` (b, K, 2) are centres, `velocity` (b, K, 2) velocities, both as seen from the hand. What is slow above a
-    link and stays so lies on it: nothing else is there that could carry it. Above the hand's height it does not count,
+    `balls` (b, K, 2) are centres, `velocity` (b, K, 2) velocities, both as seen from the hand. What is slow close above
+    a link and stays so lies on it; a ball on top of others is further up. Above the hand's height it does not count,
     since there it would balance on the hand itself.
     """
     start, link = points[:, None, :-1], np.diff(points, axis=1)[:, None]
     sideways = np.where(np.abs(link[..., 0]) > 1e-6, link[..., 0], np.nan)  # Nothing lies on an upright link.
     along = (balls[:, :, None, 0] - start[..., 0]) / sideways
     clearance = balls[:, :, None, 1] - (start[..., 1] + along * link[..., 1])
-    above = (along >= 0.0) & (along <= 1.0) & (clearance > 0.0) & (clearance < PILE_HEIGHT)
+    above = (along >= 0.0) & (along <= 1.0) & (clearance > 0.0) & (clearance < REST_HEIGHT)
     slow = (velocity**2).sum(axis=2) < SLOW**2
     held: Booleans = above.any(axis=2) & slow & (balls[:, :, 1] < 0.0)
     return held

@@ -56,6 +56,7 @@ from ._deployed import (
 from ._scene import COLOURS, Clock
 
 PAPER = "paper, table of lift cup"
+CUP_RANGE = "ours; the paper's real cups lie within"
 
 TOOL_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([0.0, 1.2, 0.05])
 """Where the held end of the handle starts; z is measured from the table top (ours)."""
@@ -87,9 +88,9 @@ MAX_MOVE: Annotated[float, Given("m", OURS, "control_action_scale")] = 0.02
 
 CUP_UNIT: Annotated[float, Given("m", OURS)] = 0.18
 """Width and height of a cup of scale 1: rims of all widths fit between prongs of the design space."""
-CUP_WIDTHS: Annotated[tuple[float, float], Given("1", f"{REAL_ROBOT}: range of its real cups")] = (0.3, 0.9)
+CUP_WIDTHS: Annotated[tuple[float, float], Given("1", CUP_RANGE)] = (0.2, 1.0)
 """Smallest and largest scale of a cup's width."""
-CUP_HEIGHTS: Annotated[tuple[float, float], Given("1", f"{REAL_ROBOT}: range of its real cups")] = (0.6, 0.9)
+CUP_HEIGHTS: Annotated[tuple[float, float], Given("1", CUP_RANGE)] = (0.5, 1.0)
 """Smallest and largest scale of a cup's height."""
 CUP_START_Y: Annotated[float, Given("m", OURS)] = 1.65
 """Where cups stand, x being 0: no fork reaches a rim at the start."""
@@ -97,7 +98,7 @@ CUP_MASS: Annotated[float, Given("kg", OURS)] = 0.2
 """Of a cup."""
 WALL: Annotated[float, Given("m", OURS)] = 0.008
 """Thickness of walls and bottom."""
-RIM_WIDTH: Annotated[float, Given("m", OURS)] = 0.02
+RIM_WIDTH: Annotated[float, Given("m", OURS)] = 0.012
 """How far the rim stands out from the walls: the play of a prong between wall and the rim's edge."""
 RIM_THICKNESS: Annotated[float, Given("m", OURS)] = 0.008
 """Of the rim."""
@@ -232,7 +233,8 @@ class LiftCup(Task):
         parameters.
 
     Goal space
-        Scales of the cup's width and height, uniform, over the range of the paper's four real cups.
+        Scales of the cup's width and height, uniform, over a range a little wider than that of the paper's four real
+        cups (ours).
 
     Reward
         The change of a potential, less the paper's slack, and the paper's bonus on success. The potential grows as
@@ -254,6 +256,7 @@ class LiftCup(Task):
 
     name = "lift_cup"
     title = "Lift cup"
+    version = 2
     scene: ClassVar = {**BULLET_SCENE, **DEPLOYED_SCENE, **constants(__name__)}
     horizon = HORIZON
     control_period = CLOCK.control_period

@@ -14,7 +14,7 @@ from ..catch_balls import BALL, BALLS, FIRST_LINK_ANGLE, GRAVITY, HAND_START, LA
 
 
 class CatchBallsScript(Behaviour):
-    """Brings the middle of whatever tool it is given beneath the balls that are still in the air."""
+    """Moves whatever tool it is given just as far as it must to have it beneath the balls still in the air."""
 
     PAN = (-1.0, 1.0, 1.0, 1.0, 1.0)
     """Normalised: a short stem, then two long links that make a pan on the right; on the left with other angles."""
@@ -22,8 +22,12 @@ class CatchBallsScript(Behaviour):
     """Factors that turn a pan on the right into one on the left."""
     GAIN = 4.0
     """Hand's speed per distance, 1/s."""
-    IN_THE_AIR = 1.0
+    DEPTH = 1.5
+    """Where balls meet the tool, below the hand, m."""
+    IN_THE_AIR = -0.6
     """A ball higher above the hand than this is still to be caught, m."""
+    MARGIN = 0.5
+    """A ball shall come down at least so far from either end of the tool, m."""
 
     def __init__(self, task: CatchBalls) -> None:
         self.task = task
@@ -41,12 +45,19 @@ class CatchBallsScript(Behaviour):
         balls = seen.state[:, BALLS].reshape(-1, NUM_BALLS, BALL.size)
         x, y, velocity_x, velocity_y, held = np.moveaxis(balls, 2, 0)  # as in BALL
         in_the_air = (y > self.IN_THE_AIR) & (held < 0.5)
-        # Time until a ball is as high as the hand: the positive root of y + velocity_y t - g t^2 / 2 = 0.
-        fall = (velocity_y + np.sqrt(velocity_y**2 + 2.0 * GRAVITY * np.maximum(y, 0.0))) / GRAVITY
+        # Time until a ball meets the tool: the positive root of y + depth + velocity_y t - g t^2 / 2 = 0.
+        height = np.maximum(y + self.DEPTH, 0.0)
+        fall = (velocity_y + np.sqrt(velocity_y**2 + 2.0 * GRAVITY * height)) / GRAVITY
+        landing = x + velocity_x * fall
         points = chain_points(self.task.design_space.from_unit(seen.design), FIRST_LINK_ANGLE)
-        middle = 0.5 * (points[:, :, 0].min(axis=1) + points[:, :, 0].max(axis=1))
-        count = in_the_air.sum(axis=1)
-        way = ((x + velocity_x * fall) * in_the_air).sum(axis=1) / np.maximum(count, 1) - middle
-        control = np.where(count > 0, self.GAIN / MAX_SPEED * way, 0.0)[:, None]
-        result: Singles = np.clip(control, -1.0, 1.0).astype(np.float32)
+        left, right = points[:, :, 0].min(axis=1), points[:, :, 0].max(axis=1)
+        margin = np.minimum(self.MARGIN, 0.5 * (right - left))
+        # The ways after which the tool is beneath all balls so far; they arrive in this order.
+        least, most = np.full(len(x), -np.inf), np.full(len(x), np.inf)
+        for ball in range(NUM_BALLS):
+            first, last = landing[:, ball] - right + margin, landing[:, ball] - left - margin
+            first, last = np.clip(first, least, most), np.clip(last, least, most)
+            least, most = np.where(in_the_air[:, ball], (first, last), (least, most))
+        way = np.clip(0.0, least, most)
+        result: Singles = np.clip(self.GAIN / MAX_SPEED * way, -1.0, 1.0)[:, None].astype(np.float32)
         return result if observation.ndim == 2 else result[0]

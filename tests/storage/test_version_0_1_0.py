@@ -35,6 +35,11 @@ MADE_BY = [
 """Methods, task, seeds and variant, settings."""
 
 
+def has_changed(task: str) -> bool:
+    """Return whether a task is at another version than the one that this folder was made on."""
+    return load_task(task).version != 1
+
+
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
     """Return a copy of the folder."""
@@ -73,7 +78,18 @@ def test_a_policy_does_what_its_curve_says(cell: str) -> None:
     assert episodes["return"].mean() == pytest.approx(told.last_evaluation()["return_mean"])
 
 
-@pytest.mark.parametrize(("methods", "task", "grid", "settings"), MADE_BY)
+@pytest.mark.parametrize(("methods", "task", "grid", "settings"), [row for row in MADE_BY if has_changed(row[1])])
+def test_finished_cells_of_a_task_that_has_changed_are_refused_and_left_alone(
+    methods: str, task: str, grid: str, settings: str, results: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = contents(results)
+    line = f"run --method {methods} --task {task} {grid} --steps 1200 --profile quick --set {settings} --out {results}"
+    assert main(line.split()) == 2
+    assert f"version of task '{task}': stored 1" in capsys.readouterr().err
+    assert contents(results) == before
+
+
+@pytest.mark.parametrize(("methods", "task", "grid", "settings"), [row for row in MADE_BY if not has_changed(row[1])])
 def test_finished_cells_count_as_done_and_are_left_alone(
     methods: str, task: str, grid: str, settings: str, results: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

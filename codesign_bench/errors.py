@@ -9,8 +9,8 @@ class UserError(Exception):
     """Bad input; the command line reports it in one or two lines (exit code 2)."""
 
 
-class OtherObservationError(UserError):
-    """What is stored was trained with another observation than its task gives now, so it cannot go on or act."""
+class ChangedTaskError(UserError):
+    """The task has changed since a stored state was trained, so the state can neither be resumed nor act."""
 
 
 def unknown_name(kind: str, name: str, choices: Iterable[str]) -> UserError:

@@ -68,32 +68,31 @@ MAX_ACCELERATION: Annotated[float, Given("m/s^2", OURS)] = 10.0
 
 NUM_BALLS: Annotated[int, Given("balls", 'paper, appendix "Environment Details"')] = 3
 """Number of balls in an episode."""
-BALL_RADIUS: Annotated[float, Given("m", OURS)] = 0.5
+BALL_RADIUS: Annotated[float, Given("m", OURS)] = 0.4
 """Radius of a ball."""
 GRAVITY: Annotated[float, Given("m/s^2", OURS)] = 8.0
 """Of the scene."""
-LINK_FRICTION: Annotated[float, Given("1", OURS)] = 0.7
+LINK_FRICTION: Annotated[float, Given("1", OURS)] = 0.4
 """Friction between link and ball. The first link has none, so that no ball balances on the hand."""
 BALL_FRICTION: Annotated[float, Given("1", OURS)] = 0.04
 """Friction between two balls: too little for a stable tower."""
 
-LANDING_DISTANCE: Annotated[tuple[float, float], Given("m", OURS)] = (1.0, 5.0)
+LANDING_DISTANCE: Annotated[tuple[float, float], Given("m", OURS)] = (1.0, 4.0)
 """Smallest and largest distance of the landing place from the hand's start."""
-LANDING_SPREAD: Annotated[float, Given("m", OURS)] = 1.2
+LANDING_SPREAD: Annotated[float, Given("m", OURS)] = 2.2
 """Largest distance of a single ball's landing place from it."""
-START_HEIGHTS: Annotated[tuple[tuple[float, float], ...], Given("m", OURS)] = (
-    (16.5, 17.0),
-    (18.25, 18.75),
-    (20.0, 20.5),
-)
-"""Lowest and highest start of each ball: above every tool, and so far apart that balls do not meet in the air."""
+START_HEIGHTS: Annotated[tuple[tuple[float, float], ...], Given("m", OURS)] = ((16.5, 17.0), (19.5, 20.0), (22.5, 23.0))
+"""Lowest and highest start of each ball: above every tool, and so far apart that balls do not meet in the air.
+
+The hand has time to move from one to the next.
+"""
 THROW_SPEED: Annotated[float, Given("m/s", OURS)] = 3.0
 """Largest speed along x at which a ball is thrown."""
 
 SLOW: Annotated[float, Given("m/s", OURS)] = 0.5
 """A ball is at rest on the tool if it is slower than this relative to the tool."""
-PILE_HEIGHT: Annotated[float, Given("m", OURS)] = 2.5
-"""A ball whose centre is less than this above a link is on the link or on balls on it."""
+REST_HEIGHT: Annotated[float, Given("m", OURS)] = 0.9
+"""A ball whose centre is less than this above a link is on the link itself, not on other balls."""
 HOLD_STEPS: Annotated[int, Given("control steps", OURS)] = 15
 """A ball is caught once it has been held for this many consecutive steps."""
 SLACK_REWARD: Annotated[float, Given("1", PAPER, "slack_reward")] = -0.001
@@ -111,7 +110,7 @@ HORIZON: Annotated[int, Given("control steps", PAPER, "max_episode_steps")] = 15
 STEPS_PER_CONTROL: Annotated[int, Given("physics steps", OURS, "control_steps_per_action")] = 4
 """In a control step."""
 PHYSICS_PERIOD: Annotated[float, Given("s", OURS)] = 1.0 / 120.0
-"""Of a physics step: the fastest ball moves a quarter of its radius."""
+"""Of a physics step: a ball that hits a tool moves less than a third of its radius."""
 CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
 
 
@@ -179,8 +178,8 @@ class CatchBalls(Task):
 
     Reward
         The change in the fraction of balls that are held, plus the paper's slack (negative) and a bonus on success. A
-        ball is held if its centre is a little above a link and below the hand, and if it is slow relative to the tool.
-        Dropping a ball costs what holding it earned, so nothing is earned twice. An episode's return is below 2.
+        ball is held if it is on a link, below the hand, and slow relative to the tool; a ball on other balls is not
+        held. Dropping a ball costs what holding it earned, so nothing is earned twice. An episode's return is below 2.
 
     Starting state
         The hand at rest at the paper's position; the balls above every tool, at different heights (ours).
@@ -192,6 +191,7 @@ class CatchBalls(Task):
 
     name = "catch_balls"
     title = "Catch balls"
+    version = 2
     scene: ClassVar = {**CHAIN_SCENE, **constants(__name__)}
     horizon = HORIZON
     control_period = CLOCK.control_period
@@ -204,7 +204,7 @@ class CatchBalls(Task):
     state_space = STATE
     reward_terms: ClassVar = {
         "progress": f"(k_now - k_before) / {NUM_BALLS}, k the number of balls held: above a link by less than "
-        f"{PILE_HEIGHT:g} m, below the hand, and slower than {SLOW:g} m/s as seen from the tool",
+        f"{REST_HEIGHT:g} m, below the hand, and slower than {SLOW:g} m/s as seen from the tool",
         "slack": f"{SLACK_REWARD:g}",
         "success": f"{SUCCESS_REWARD:g} in the step that solves the task",
     }
@@ -213,8 +213,8 @@ class CatchBalls(Task):
     failure_condition = "a ball has fallen below the tool, and every other one has, too, or is caught"
 
     run_settings: ClassVar[ByProfile] = {
-        "quick": {"steps": 400_000, "tradeoff_scale": 0.01},
-        "laptop": {"tradeoff_scale": 0.01},
+        "quick": {"steps": 400_000, "tradeoff_scale": 0.02},
+        "laptop": {"tradeoff_scale": 0.02},
     }
     outcome = Quantity("balls held", "balls")
     soundness = Soundness(
@@ -274,7 +274,7 @@ class CatchBalls(Task):
 class _CatchSimulator(PlanarSimulator):
     """Three balls and a kinematic tool per slot, between a floor and two walls that keep missed balls in view."""
 
-    view = View(x=(WALLS[0] - 0.5, WALLS[1] + 0.5), y=(FLOOR - 1.0, FLOOR + 28.0))
+    view = View(x=(WALLS[0] - 0.5, WALLS[1] + 0.5), y=(FLOOR - 1.0, FLOOR + 31.0))
 
     def __init__(self, num_slots: int, state_size: int, clock: Clock) -> None:
         super().__init__(num_slots, state_size, num_bodies=NUM_BALLS + 1, clock=clock)
@@ -389,14 +389,14 @@ def is_held(points: Floats, balls: Floats, velocity: Floats) -> Booleans:
     """Return which balls (b, K) are held by tools with chain `points` (b, 4, 2).
 
     `balls` (b, K, 2) are centres, `velocity` (b, K, 2) velocities, both relative to the hand. A ball that stays slow
-    above a link must rest on it, because nothing else there can carry it. A ball above the hand's height does not
+    close above a link must rest on it; a ball on top of others is farther up. A ball above the hand's height does not
     count, because it would be balanced on the hand.
     """
     start, link = points[:, None, :-1], np.diff(points, axis=1)[:, None]
     sideways = np.where(np.abs(link[..., 0]) > 1e-6, link[..., 0], np.nan)  # nothing rests on an upright link
     along = (balls[:, :, None, 0] - start[..., 0]) / sideways
     clearance = balls[:, :, None, 1] - (start[..., 1] + along * link[..., 1])
-    above = (along >= 0.0) & (along <= 1.0) & (clearance > 0.0) & (clearance < PILE_HEIGHT)
+    above = (along >= 0.0) & (along <= 1.0) & (clearance > 0.0) & (clearance < REST_HEIGHT)
     slow = (velocity**2).sum(axis=2) < SLOW**2
     held: Booleans = above.any(axis=2) & slow & (balls[:, :, 1] < 0.0)
     return held

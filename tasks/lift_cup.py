@@ -56,6 +56,7 @@ from ._deployed import (
 from ._scene import COLOURS, Clock
 
 PAPER = "paper, table of lift cup"
+CUP_RANGE = "ours; the paper's real cups lie within"
 
 TOOL_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([0.0, 1.2, 0.05])
 """Where the held end of the handle starts; z is measured from the table top (ours)."""
@@ -87,9 +88,9 @@ would be 2.4 m/s."""
 
 CUP_UNIT: Annotated[float, Given("m", OURS)] = 0.18
 """Width and height of a cup of scale 1: rims of all widths fit between prongs of the design space."""
-CUP_WIDTHS: Annotated[tuple[float, float], Given("1", f"{REAL_ROBOT}: range of its real cups")] = (0.3, 0.9)
+CUP_WIDTHS: Annotated[tuple[float, float], Given("1", CUP_RANGE)] = (0.2, 1.0)
 """Smallest and largest scale of a cup's width."""
-CUP_HEIGHTS: Annotated[tuple[float, float], Given("1", f"{REAL_ROBOT}: range of its real cups")] = (0.6, 0.9)
+CUP_HEIGHTS: Annotated[tuple[float, float], Given("1", CUP_RANGE)] = (0.5, 1.0)
 """Smallest and largest scale of a cup's height."""
 CUP_START_Y: Annotated[float, Given("m", OURS)] = 1.65
 """Start of cups along y, with x = 0: no fork reaches a rim at the start."""
@@ -97,7 +98,7 @@ CUP_MASS: Annotated[float, Given("kg", OURS)] = 0.2
 """Mass of a cup."""
 WALL: Annotated[float, Given("m", OURS)] = 0.008
 """Thickness of walls and bottom."""
-RIM_WIDTH: Annotated[float, Given("m", OURS)] = 0.02
+RIM_WIDTH: Annotated[float, Given("m", OURS)] = 0.012
 """Width of the rim beyond the walls: the play of a prong between the wall and the rim's edge."""
 RIM_THICKNESS: Annotated[float, Given("m", OURS)] = 0.008
 """Thickness of the rim."""
@@ -231,7 +232,8 @@ class LiftCup(Task):
         rear ends, in front of the cross bar. The right prong, node 3, mirrors the left one and has no parameters.
 
     Goal space
-        Scales of the cup's width and height, uniform, over the range of the paper's four real cups.
+        Scales of the cup's width and height, uniform, over a range a little wider than that of the paper's four real
+        cups (ours).
 
     Reward
         The change of a potential, plus the paper's slack (negative) and the paper's bonus on success. The potential
@@ -253,6 +255,7 @@ class LiftCup(Task):
 
     name = "lift_cup"
     title = "Lift cup"
+    version = 2
     scene: ClassVar = {**BULLET_SCENE, **DEPLOYED_SCENE, **constants(__name__)}
     horizon = HORIZON
     control_period = CLOCK.control_period

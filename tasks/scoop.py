@@ -225,12 +225,12 @@ class Scoop(Task):
         the tool keeps away from floor and walls (ours).
 
     Observation
-        State, 69: position of the first joint (m), tilt (rad), height of the tool's lowest point (m), velocity (m/s) and
-        angular velocity (rad/s); number of balls held out of the reservoir, the same minus the requested number, control
-        steps for which success has held; the displacements from the first joint to the second and to the tip (m); a one-hot code of the
-        requested number; and the balls, as a profile of the pile: how high the topmost ball reaches (m) at evenly
-        spaced x that move with the first joint, and how fast this ball rises (m/s). Goal, 1: the requested number. Then
-        the design and the phase.
+        State, 69: position of the first joint (m), tilt (rad), height of the tool's lowest point (m), velocity
+        (m/s) and angular velocity (rad/s); number of balls held out of the reservoir, the same minus the
+        requested number, control steps for which success has held; the displacements from the first joint to
+        the second and to the tip (m); a one-hot code of the requested number; and the balls, as a profile of
+        the pile: how high the topmost ball reaches (m) at evenly spaced x that move with the first joint, and
+        how fast this ball rises (m/s). Goal, 1: the requested number. Then the design and the phase.
 
         The paper's policies observe positions and velocities of the balls; the profile is our form of them. It does not
         depend on the balls' order, is short, and shows the designer the pile around the place of the tool, before there
@@ -242,8 +242,9 @@ class Scoop(Task):
         three angles; a chain of three links has two joints, and the third angle is not used.
 
     Goal space
-        Integer numbers of balls (paper), with equal probability (ours). An instance also holds which pile there is and how
-        far to the left or right the tool starts; these are no part of the goal, but the state shows them.
+        Integer numbers of balls (paper), with equal probability (ours). An instance also holds which pile there
+        is and how far to the left or right the tool starts; these are no part of the goal, but the state shows
+        them.
 
     Reward
         The change of a potential, plus the paper's slack (negative) and a bonus on success. The potential increases as
@@ -260,6 +261,7 @@ class Scoop(Task):
     """
 
     name = "scoop"
+    version = 2
     title = "Scoop"
     scene: ClassVar = constants(__name__)
     horizon = HORIZON

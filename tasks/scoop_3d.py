@@ -255,12 +255,13 @@ class Scoop3D(Task):
         its rotations about x, y, z (rad) in a control step (paper; scale ours). Both are limited (ours).
 
     Observation
-        State, 120: position x, y, z (m) and rotations about x, y, z (rad) of the bottom plate, distance from its lowest point up
-        to the line (m); numbers of balls in or above the tool, held above the line, and missing; elapsed
-        fractions of the control steps to success and failure; mean position of the balls in or above the tool, in its frame,
-        x, y (m), and the height of the highest (m); a one-hot code of the requested number; and the balls, as a profile
-        of the pile: how high the topmost ball reaches (m) at the places of a square grid that moves with the middle of
-        the bottom plate, and how fast this ball rises (m/s). Goal, 1: the requested number. Then the design and the phase.
+        State, 120: position x, y, z (m) and rotations about x, y, z (rad) of the bottom plate, distance from
+        its lowest point up to the line (m); numbers of balls in or above the tool, held above the line, and
+        missing; elapsed fractions of the control steps to success and failure; mean position of the balls in or
+        above the tool, in its frame, x, y (m), and the height of the highest (m); a one-hot code of the
+        requested number; and the balls, as a profile of the pile: how high the topmost ball reaches (m) at the
+        places of a square grid that moves with the middle of the bottom plate, and how fast this ball rises
+        (m/s). Goal, 1: the requested number. Then the design and the phase.
 
         The paper's policies observe positions and velocities of the balls; the profile is our form of them. It does not
         depend on the balls' order, is shorter, and shows the designer the balls around the place of the tool, before
@@ -274,8 +275,9 @@ class Scoop3D(Task):
         above the opening.
 
     Goal space
-        Integer numbers of balls (paper), with equal probability. An instance also holds the number of a pile: how the balls
-        are placed and poured on the tool; it is no part of the goal, but the state shows how they lie.
+        Integer numbers of balls (paper), with equal probability. An instance also holds the number of a pile:
+        how the balls are placed and poured on the tool; it is no part of the goal, but the state shows how they
+        lie.
 
     Reward
         The change of a potential, plus the paper's slack (negative) and the paper's bonus on success. The potential
@@ -295,6 +297,7 @@ class Scoop3D(Task):
     """
 
     name = "scoop_3d"
+    version = 2
     title = "Scoop (3D)"
     scene: ClassVar = {**BULLET_SCENE, **constants(__name__)}
     horizon = HORIZON

@@ -11,7 +11,8 @@ from typing import Any
 from codesign_bench.cell.axes import axis_named
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.config.profiles import DEFAULT_PROFILE
-from codesign_bench.config.resolve import ResolvedConfig, check_overrides, resolve
+from codesign_bench.config.resolve import ResolvedConfig, check_overrides, differences, resolve
+from codesign_bench.config.settings import StoredConfig
 from codesign_bench.method import Method, Problem, load_method
 from codesign_bench.task import Task, load_task
 
@@ -68,6 +69,13 @@ class ResolvedCell:
     task: Task
     method_class: type[Method[Any]]
     config: ResolvedConfig
+
+    def differences(self, stored: StoredConfig, task_version: int) -> list[str]:
+        """Return "name: stored X, requested Y" for each value in which a stored cell differs from this one."""
+        found = differences(stored, self.config)
+        if task_version != self.task.version:
+            found.insert(0, f"version of task '{self.task.name}': stored {task_version}, requested {self.task.version}")
+        return found
 
     def problem(self) -> Problem:
         """Return the learning problem of its method."""

@@ -33,7 +33,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         overrides=tuple(options.overrides),
     )
     (resolved,) = resolve_cells([cell])
-    rows = [
+    rows = [("task", "version", str(resolved.task.version), resolved.task.name)]
+    rows += [
         (part, name, str(value), source)
         for part, settings in resolved.config.stored().parts.items()
         for name, (value, source) in settings.items()

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from codesign_bench.errors import OtherObservationError
+from codesign_bench.errors import ChangedTaskError
 from codesign_bench.learning.networks import RunningNorm
 from codesign_bench.method import Array
 
@@ -33,7 +33,7 @@ def load_learner_arrays(modules: Modules, optimizers: Optimizers, arrays: Mappin
     """Restore the arrays that `learner_arrays` returned.
 
     Raises:
-        OtherObservationError: a module normalises another number of observed entries.
+        ChangedTaskError: a module normalises another number of observed entries.
         RuntimeError: names or shapes differ from the modules' otherwise.
     """
     for name, module in modules.items():
@@ -51,13 +51,13 @@ def load_module_arrays(module: nn.Module, arrays: Mapping[str, Array]) -> None:
     """Restore the arrays that `module_arrays` returned.
 
     Raises:
-        OtherObservationError: the module normalises another number of observed entries.
+        ChangedTaskError: the module normalises another number of observed entries.
         RuntimeError: names or shapes differ from the module's otherwise.
     """
     for name, part in module.named_modules():
         stored = arrays.get(f"{name}.mean" if name else "mean")
         if isinstance(part, RunningNorm) and stored is not None and len(stored) != len(part.mean):
-            raise OtherObservationError(
+            raise ChangedTaskError(
                 f"trained with another observation: {len(stored)} entries of state and goal, now {len(part.mean)}"
             )
     module.load_state_dict({name: torch.from_numpy(np.array(array)) for name, array in arrays.items()})

@@ -42,16 +42,17 @@ def configurations(cells: Sequence[PageCell]) -> list[Configuration]:
 
 
 def version_table(cells: Sequence[PageCell]) -> Table:
-    """Return the version of every package that cells record, with the cells if versions differ."""
+    """Return the versions of tasks and packages that cells record, with the cells where they differ."""
     packages = dict.fromkeys(name for cell in cells for name in cell.record.versions)
-    rows = []
+    tasks = _grouped(cells, lambda cell: (cell.task, str(cell.record.task_version)))
+    rows = [(f"task {task}", version, where(group, cells)) for (task, version), group in tasks]
     for name in packages:
 
         def version(cell: PageCell, name: str = name) -> str:
             return str(cell.record.versions.get(name) or "not installed")
 
         rows += [(name, found, where(group, cells)) for found, group in _grouped(cells, version)]
-    return Table(("package", "version", "cells"), rows)
+    return Table(("task or package", "version", "cells"), rows)
 
 
 def machine_table(cells: Sequence[PageCell]) -> Table:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from codesign_bench.config.resolve import method_config
-from codesign_bench.errors import OtherObservationError, UserError
+from codesign_bench.errors import ChangedTaskError, UserError
 from codesign_bench.method import Array, Policy, load_method
 from codesign_bench.storage.cells import StoredCell, open_cell
 from codesign_bench.storage.checkpoint import load_arrays, save_arrays
@@ -23,6 +23,7 @@ def load_policy(folder: str | Path) -> Policy:
     """Return the final policy of the cell in `folder`; `design(observation)` and `act(observation)` return its means.
 
     Raises:
+        ChangedTaskError: its task has changed since.
         UserError: the folder has no finished cell, or its files are damaged or incompatible with this version.
     """
     return policy_of(open_cell(folder))
@@ -32,7 +33,7 @@ def policy_of(cell: StoredCell) -> Policy:
     """Return the final policy of a cell.
 
     Raises:
-        OtherObservationError: it was trained with another observation than its task gives now.
+        ChangedTaskError: its task has changed since: its version, or the size of its observation.
         UserError: it is not finished, or its files are damaged or incompatible with this version.
     """
     tensors, record, path = policy_tensors(cell), cell.record, cell.folder / POLICY_FILE
@@ -40,9 +41,9 @@ def policy_of(cell: StoredCell) -> Policy:
     config = method_config(method_class.config_class, record.config.method)
     try:
         return method_class.make_policy(load_task(record.task), config, tensors)
-    except OtherObservationError as error:
+    except ChangedTaskError as error:
         again = f"codesign-bench run --task {record.task} --method {record.method}"
-        raise OtherObservationError(f"{path} was {error}; train it again, into another folder: {again}") from error
+        raise ChangedTaskError(f"{path} was {error}; train it again, into another folder: {again}") from error
     except (KeyError, ValueError, RuntimeError) as error:
         raise UserError(f"{path} is incompatible with method '{record.method}' of this version: {error}") from error
 
@@ -51,11 +52,11 @@ def misfit(cell: StoredCell) -> str:
     """Return why a cell's final policy cannot act on its task as it is now, or "" if it can.
 
     Raises:
-        UserError: the cell is not finished, or its files are damaged or incompatible with this version for another reason.
+        UserError: the cell is not finished, or its files are damaged or otherwise incompatible with this version.
     """
     try:
         policy_of(cell)
-    except OtherObservationError as error:
+    except ChangedTaskError as error:
         return str(error)
     return ""
 
@@ -64,7 +65,7 @@ def policy_and_task(folder: Path, name: str | None) -> tuple[Policy, Task]:
     """Return the final policy of the cell in `folder` and its task.
 
     Raises:
-        UserError: it is not a finished cell, or was trained on a task other than `name`.
+        UserError: it is not a finished cell, was trained on a task other than `name`, or its task has changed since.
     """
     cell = open_cell(folder)
     trained_on = cell.record.task
@@ -77,8 +78,15 @@ def policy_tensors(cell: StoredCell) -> dict[str, Array]:
     """Return the tensors of a cell's final policy.
 
     Raises:
+        ChangedTaskError: the task has another version now.
         UserError: the cell is not finished, or the file is damaged.
     """
+    record, now = cell.record, load_task(cell.record.task).version
+    if record.task_version != now:
+        raise ChangedTaskError(
+            f"'{cell.folder}' was trained on version {record.task_version} of task '{record.task}', which is now at "
+            f"version {now}: train it again, or use the release that made it"
+        )
     path = cell.folder / POLICY_FILE
     try:
         return load_arrays(path)[0]

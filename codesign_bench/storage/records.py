@@ -61,6 +61,8 @@ class CellRecord:
     variant: Variant
     seed: int
     profile: str = DEFAULT_PROFILE
+    task_version: int = 1
+    """`Task.version` when it ran."""
     label: str = ""
     """The method's name in figures."""
     status: str = RUNNING
@@ -110,6 +112,7 @@ class CellRecord:
             "schema": SCHEMA,
             "status": self.status,
             "task": self.task,
+            "task_version": self.task_version,
             "method": self.method,
             "variant": self.variant.name,
             "axes": self.variant.to_json(),
@@ -141,6 +144,7 @@ class CellRecord:
         failure = content["failure"]
         return cls(
             task=_text(content, "task"),
+            task_version=int(content.get("task_version", 1)),  # absent from cells of tasks that had not changed yet
             method=_text(content, "method"),
             variant=Variant.from_json(axes),
             seed=int(content["seed"]),

@@ -16,7 +16,6 @@ from pathlib import Path
 import filelock
 
 from codesign_bench.cell.cell import Cell, ResolvedCell, resolve_cell
-from codesign_bench.config.resolve import differences
 from codesign_bench.errors import UserError
 from codesign_bench.machine import host_facts, package_versions
 from codesign_bench.plugins import import_modules
@@ -57,7 +56,7 @@ def run_locked(cell: Cell, folder: Path, *, retry: bool) -> int:
         return EXIT_FAILED
     import_modules([])
     resolved = resolve_cell(cell)
-    if before is not None and (different := differences(before.config, resolved.config)):
+    if before is not None and (different := resolved.differences(before.config, before.task_version)):
         print(f"the stored configuration differs: {'; '.join(different)}", file=sys.stderr)
         return EXIT_REFUSED
     remove_partial_files(folder)
@@ -72,6 +71,7 @@ def describe(resolved: ResolvedCell, before: CellRecord | None) -> CellRecord:
     cell, config = resolved.cell, resolved.config
     return CellRecord(
         task=cell.task,
+        task_version=resolved.task.version,
         method=cell.method,
         variant=cell.variant,
         seed=cell.seed,

@@ -12,7 +12,6 @@ import pandas as pd
 from rich.console import Console
 
 from codesign_bench.cell.cell import Cell, ResolvedCell
-from codesign_bench.config.resolve import differences
 from codesign_bench.console import Log, printer
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores
@@ -166,7 +165,8 @@ def _refuse_other_configurations(
     refused = [
         (resolved.cell, different)
         for resolved in cells
-        if (record := records[resolved.cell]) is not None and (different := differences(record.config, resolved.config))
+        if (record := records[resolved.cell]) is not None
+        and (different := resolved.differences(record.config, record.task_version))
     ]
     if refused:
         cell, different = refused[0]

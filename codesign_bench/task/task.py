@@ -41,6 +41,8 @@ class Task(ABC):
     """The task's name, which is also the name of its file."""
     title: ClassVar[str]
     """The task's name in figures."""
+    version: ClassVar[int] = 1
+    """Raised whenever results can no longer be compared with earlier ones: another scene, reward or instances."""
     horizon: ClassVar[int]
     """Control steps until the time limit."""
     control_period: ClassVar[float]

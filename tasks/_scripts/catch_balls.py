@@ -14,7 +14,7 @@ from ..catch_balls import BALL, BALLS, FIRST_LINK_ANGLE, GRAVITY, HAND_START, LA
 
 
 class CatchBallsScript(Behaviour):
-    """Moves the middle of any tool beneath the balls that are still in the air."""
+    """Moves any tool only as far as necessary to be beneath the balls that are still in the air."""
 
     PAN = (-1.0, 1.0, 1.0, 1.0, 1.0)
     """Normalised design: a short stem, then two long links that form a pan on the right, or mirrored on the left."""
@@ -22,8 +22,12 @@ class CatchBallsScript(Behaviour):
     """Factors that mirror a pan on the right to the left."""
     GAIN = 4.0
     """Speed of the hand per distance, 1/s."""
-    IN_THE_AIR = 1.0
+    DEPTH = 1.5
+    """Distance below the hand at which balls meet the tool, m."""
+    IN_THE_AIR = -0.6
     """A ball higher above the hand than this counts as in the air, m."""
+    MARGIN = 0.5
+    """Smallest distance of a landing ball from either end of the tool, m."""
 
     def __init__(self, task: CatchBalls) -> None:
         self.task = task
@@ -41,15 +45,19 @@ class CatchBallsScript(Behaviour):
         balls = seen.state[:, BALLS].reshape(-1, NUM_BALLS, BALL.size)
         x, y, velocity_x, velocity_y, held = np.moveaxis(balls, 2, 0)  # as in BALL
         in_the_air = (y > self.IN_THE_AIR) & (held < 0.5)
-        # Time until a ball is at the height of the hand: the positive root of y + velocity_y t - g t^2 / 2 = 0. Below
-        # the hand there is none: y is set to 0, and such a ball is masked out below.
-        fall = (velocity_y + np.sqrt(velocity_y**2 + 2.0 * GRAVITY * np.maximum(y, 0.0))) / GRAVITY
+        # Time until a ball meets the tool: the positive root of y + depth + velocity_y t - g t^2 / 2 = 0.
+        height = np.maximum(y + self.DEPTH, 0.0)
+        fall = (velocity_y + np.sqrt(velocity_y**2 + 2.0 * GRAVITY * height)) / GRAVITY
+        landing = x + velocity_x * fall
         points = chain_points(self.task.design_space.from_unit(seen.design), FIRST_LINK_ANGLE)
-        middle = 0.5 * (points[:, :, 0].min(axis=1) + points[:, :, 0].max(axis=1))
-        count = in_the_air.sum(axis=1)
-        # The tool aims at the mean landing place of the balls in the air, with the middle of its extent rather than the
-        # held point: the hand is at one end of a pan.
-        way = ((x + velocity_x * fall) * in_the_air).sum(axis=1) / np.maximum(count, 1) - middle
-        control = np.where(count > 0, self.GAIN / MAX_SPEED * way, 0.0)[:, None]
-        result: Singles = np.clip(control, -1.0, 1.0).astype(np.float32)
+        left, right = points[:, :, 0].min(axis=1), points[:, :, 0].max(axis=1)
+        margin = np.minimum(self.MARGIN, 0.5 * (right - left))
+        # The ways after which the tool is beneath all balls so far; they arrive in this order.
+        least, most = np.full(len(x), -np.inf), np.full(len(x), np.inf)
+        for ball in range(NUM_BALLS):
+            first, last = landing[:, ball] - right + margin, landing[:, ball] - left - margin
+            first, last = np.clip(first, least, most), np.clip(last, least, most)
+            least, most = np.where(in_the_air[:, ball], (first, last), (least, most))
+        way = np.clip(0.0, least, most)
+        result: Singles = np.clip(self.GAIN / MAX_SPEED * way, -1.0, 1.0)[:, None].astype(np.float32)
         return result if observation.ndim == 2 else result[0]

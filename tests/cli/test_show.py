@@ -14,6 +14,7 @@ def test_show_tells_the_source_of_every_value(capsys: pytest.CaptureFixture[str]
     arguments = ["show", "--method", "toy_search", "--task", "toy_reach", "--profile", "paper", "--set", "widths=1,2"]
     assert main(arguments) == 0
     rows = {line.split()[1]: line for line in capsys.readouterr().out.splitlines()}
+    assert rows["version"].split() == ["task", "version", "1", "toy_reach"]
     assert rows["widths"].split(maxsplit=4)[2:] == ["[1,", "2]", "--set"]
     assert rows["step_size"].endswith("toy paper, table 1")
     assert rows["episodes"].endswith("toy paper, table 2")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from codesign_bench.errors import OtherObservationError
+from codesign_bench.errors import ChangedTaskError
 from codesign_bench.learning.checkpointing import learner_arrays, load_learner_arrays, load_module_arrays, module_arrays
 from codesign_bench.learning.networks import RunningNorm
 from codesign_bench.learning.optimizers import adam
@@ -62,5 +62,5 @@ def test_arrays_of_another_network_are_refused(change: dict[str, np.ndarray | No
 
 def test_arrays_that_were_trained_with_another_observation_are_refused_as_such() -> None:
     before, after = (torch.nn.Sequential(RunningNorm([0.0] * size, [1.0] * size)) for size in (3, 5))
-    with pytest.raises(OtherObservationError, match="another observation: 3 entries of state and goal, now 5"):
+    with pytest.raises(ChangedTaskError, match="another observation: 3 entries of state and goal, now 5"):
         load_module_arrays(after, module_arrays(before))

@@ -29,6 +29,7 @@ def test_settings_that_differ_between_cells_get_a_line_for_each_value(tmp_path: 
         ("clip", "0.2", "default", "weave"),
     ]
     assert ("torch", "not installed", "weave") in version_table(cells).rows
+    assert ("task weave", "1", "weave") in version_table(cells).rows
 
 
 def test_cells_that_nothing_but_their_seed_tells_apart_are_named(tmp_path: Path) -> None:

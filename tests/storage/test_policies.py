@@ -9,10 +9,11 @@ import pytest
 
 from builders import VERSION_0_1_0, store_cell, sweep, toy_cells
 from codesign_bench import load_policy
-from codesign_bench.errors import OtherObservationError, UserError
+from codesign_bench.errors import ChangedTaskError, UserError
 from codesign_bench.storage.cells import open_cell
 from codesign_bench.storage.policies import misfit, policy_and_task
 from codesign_bench.task import Box, load_task
+from toy import ToyReach
 
 
 @pytest.mark.parametrize(("status", "named"), [("done", "policy file is missing"), ("running", "'interrupted'")])
@@ -38,6 +39,24 @@ def test_the_policy_on_disk_is_the_one_that_was_judged(tmp_path: Path) -> None:
     assert policy_and_task(folder, "toy_reach")[1].name == "toy_reach"
     with pytest.raises(UserError, match="trained on 'toy_reach', not on 'push'"):
         policy_and_task(folder, "push")
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_policy_of_another_version_of_its_task_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (cell,) = toy_cells()
+    sweep([cell], tmp_path)
+    folder = cell.folder(tmp_path)
+    assert open_cell(folder).record.task_version == 1
+    monkeypatch.setattr(ToyReach, "version", 2)
+    with pytest.raises(UserError, match="trained on version 1 of task 'toy_reach', which is now at version 2"):
+        load_policy(folder)
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_damaged_policy_is_named(tmp_path: Path) -> None:
+    (cell,) = toy_cells()
+    sweep([cell], tmp_path)
+    folder = cell.folder(tmp_path)
     damaged = folder / "policy.safetensors"
     damaged.write_bytes(damaged.read_bytes()[:-3])
     with pytest.raises(UserError, match=r"policy\.safetensors"):
@@ -52,7 +71,7 @@ def test_a_policy_that_was_trained_with_another_observation_says_so_in_one_line(
     space, task_class = load_task("push").state_space, type(load_task("push"))
     entries = dict(zip(space.names, zip(space.low, space.high, space.units, strict=True), strict=True))
     monkeypatch.setattr(task_class, "state_space", Box.of(**entries, wind=(-1.0, 1.0, "m/s")))
-    with pytest.raises(OtherObservationError, match=r"policy\.safetensors was trained with another obs.*again") as told:
+    with pytest.raises(ChangedTaskError, match=r"policy\.safetensors was trained with another obs.*again") as told:
         load_policy(cells[0].folder)
     assert "\n" not in str(told.value)
     assert misfit(cells[0]) == str(told.value)

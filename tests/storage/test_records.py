@@ -47,6 +47,7 @@ def test_a_record_is_read_as_it_was_written(tmp_path: Path) -> None:
         method="gnn_ppo",
         variant=Variant.of(cutout=0.4, finetune=2),
         seed=1,
+        task_version=3,
         label="Ours",
         status=FAILED,
         env_steps=12,

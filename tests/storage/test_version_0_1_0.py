@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from builders import VERSION_0_1_0
-from codesign_bench import load_results
+from codesign_bench import load_results, load_task
 from codesign_bench.cli import main
 from codesign_bench.storage.cells import find_cells
 from codesign_bench.storage.frames import load_evaluations, rows_varying
@@ -32,6 +32,11 @@ MADE_BY = [
     ("gnn_ppo", "catch_balls", "--seeds 1 --alpha 0.125", GNN_PPO),
 ]
 """Methods, task, seeds and variant, settings."""
+
+
+def has_changed(task: str) -> bool:
+    """Return whether a task is at another version than the one that this folder was made on."""
+    return load_task(task).version != 1
 
 
 @pytest.fixture
@@ -73,7 +78,18 @@ def test_a_policy_does_what_its_curve_says(cell: str) -> None:
     )
 
 
-@pytest.mark.parametrize(("methods", "task", "grid", "settings"), MADE_BY)
+@pytest.mark.parametrize(("methods", "task", "grid", "settings"), [row for row in MADE_BY if has_changed(row[1])])
+def test_finished_cells_of_a_task_that_has_changed_are_refused_and_left_alone(
+    methods: str, task: str, grid: str, settings: str, results: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = contents(results)
+    line = f"run --method {methods} --task {task} {grid} --steps 1200 --profile quick --set {settings} --out {results}"
+    assert main(line.split()) == 2
+    assert f"version of task '{task}': stored 1" in capsys.readouterr().err
+    assert contents(results) == before
+
+
+@pytest.mark.parametrize(("methods", "task", "grid", "settings"), [row for row in MADE_BY if not has_changed(row[1])])
 def test_finished_cells_count_as_done_and_are_left_alone(
     methods: str, task: str, grid: str, settings: str, results: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

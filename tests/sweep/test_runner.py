@@ -14,6 +14,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.storage.layout import CHECKPOINT_FILE, open_folder
 from codesign_bench.storage.records import CellRecord
 from codesign_bench.sweep.runner import make_plan, split_cores
+from toy import ToyReach
 
 pytestmark = pytest.mark.usefixtures("toy")
 
@@ -88,6 +89,13 @@ def test_another_configuration_is_refused_with_the_difference(tmp_path: Path) ->
     with pytest.raises(UserError, match="steps: stored 200, requested 300"):
         make_plan(resolve_cells(cells(1, steps=300)), tmp_path)
     assert make_plan(resolve_cells(cells(1, profile="quick")), tmp_path).done
+
+
+def test_cells_of_another_version_of_their_task_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sweep([CELL], tmp_path)
+    monkeypatch.setattr(ToyReach, "version", 2)
+    with pytest.raises(UserError, match="version of task 'toy_reach': stored 1, requested 2"):
+        make_plan(resolve_cells(cells(1)), tmp_path)
 
 
 def test_a_truncated_checkpoint_is_refused_before_anything_runs(tmp_path: Path) -> None:

@@ -208,9 +208,30 @@ def test_balls_come_down_left_and_right_of_the_hand_equally_often_and_never_near
     assert (distance < 0.5 * (near + far)).mean() == pytest.approx(0.5, abs=0.015)
 
 
+def test_a_ball_on_top_of_others_is_not_held() -> None:
+    points = np.array([[[0.0, 0.0], [0.0, -1.0], [3.0**0.5, -2.0], [2.0 * 3.0**0.5, -1.0]]])
+    steep = (catch.LINK_HALF_WIDTH + catch.BALL_RADIUS) / np.cos(np.pi / 6.0)  # above a link, in a corner as well
+    heights = {steep: True, steep + 2.0**0.5 * catch.BALL_RADIUS: False}
+    for height, held in heights.items():
+        assert catch.is_held(points, np.array([[[3.0**0.5, -2.0 + height]]]), np.zeros((1, 1, 2))).item() is held
+
+
 def test_a_small_pan_needs_a_hand_that_moves() -> None:
     task = load_task("catch_balls")
-    small, far = np.array([[-1.0, 0.2, 0.2, 1.0, 1.0]]), throw(3.0)
+    small, far = np.array([[-1.0, 0.6, 0.6, 1.0, 1.0]]), throw(3.8)
     assert not play(far, small).success
-    assert task.material(task.design_space.from_unit(small))[0] < 0.5
     assert evaluate(task, GivenDesigns(small[0], task.script()), instances=far).successes.all()
+
+
+def test_a_smaller_pan_solves_nearly_as_much_with_more_effort() -> None:
+    """Material and effort, the two sides of the trade-off, can be had for each other."""
+    task = load_task("catch_balls")
+    instances, tools = task.evaluation_instances()[:48], []
+    for length in (1.0, 0.6):
+        side = np.sign(instances[:, [catch.LANDING]] - catch.HAND_START[0])
+        angles, ones = np.repeat(side, 2, axis=1), np.ones((len(instances), 1))
+        tools.append(np.concatenate([-ones, length * ones, length * ones, angles], axis=1))
+    large, small = (evaluate(task, GivenDesigns(tool, task.script()), instances=instances) for tool in tools)
+    assert small.material.mean() < large.material.mean() - 0.05
+    assert small.effort.mean() > large.effort.mean() + 0.05
+    assert small.successes.mean() > large.successes.mean() - 0.1

@@ -155,7 +155,7 @@ def test_mass_centre_and_inertia_of_a_cup_are_those_of_its_boxes() -> None:
     np.testing.assert_allclose(seen[2], expected, rtol=1e-5)
 
 
-@pytest.mark.parametrize("cup", list(product((0.3, 0.9), (0.6, 0.9))))
+@pytest.mark.parametrize("cup", list(product(lift.CUP_WIDTHS, lift.CUP_HEIGHTS)))
 def test_no_tool_starts_on_the_table_or_at_a_cup(cup: tuple[float, float]) -> None:
     task, slots = load_task("lift_cup"), np.arange(8)
     episodes = Episodes(task, len(slots))
@@ -184,10 +184,11 @@ def test_prongs_under_the_rim_lift_a_cup_and_others_do_not(cup: tuple[float, flo
         assert not play(cup, fork(cup, lift.RIM_WIDTH + 0.005)).success, "too wide for the rim"
 
 
-def test_the_fork_for_one_width_lifts_no_cup_that_is_40_mm_wider_or_narrower() -> None:
-    for other in (MIDDLE[0] - 0.041 / lift.CUP_UNIT, MIDDLE[0] + 0.041 / lift.CUP_UNIT):
+def test_the_fork_for_one_width_lifts_no_cup_that_is_two_rims_wider_or_narrower() -> None:
+    beyond = (2.0 * lift.RIM_WIDTH + 0.001) / lift.CUP_UNIT
+    for other in (MIDDLE[0] - beyond, MIDDLE[0] + beyond):
         for clearance in (0.0, 0.5 * lift.RIM_WIDTH, lift.RIM_WIDTH):
-            outcome = play((max(other, 0.0), MIDDLE[1]), fork(MIDDLE, clearance))
+            outcome = play((other, MIDDLE[1]), fork(MIDDLE, clearance))
             assert not outcome.success
 
 

@@ -44,7 +44,9 @@ class Difference(NamedTuple):
 
 DIFFERENCES = {
     ("push", "control_steps_per_action"): Difference(1, 2, "a physics step as short as the early scenes'"),
-    ("catch_balls", "control_steps_per_action"): Difference(1, 4, "the fastest ball moves a quarter of its radius"),
+    ("catch_balls", "control_steps_per_action"): Difference(
+        1, 4, "no ball that hits a tool moves a third of its radius"
+    ),
     ("fetch_cube", "control_action_scale"): Difference(0.1, 0.02, "2.4 m/s would shoot cubes from the table"),
     ("lift_cup", "control_action_scale"): Difference(0.1, 0.02, "2.4 m/s would bat cups away"),
     ("scoop_3d", "control_action_scale"): Difference(0.05, 0.015, "1.5 m/s would throw balls about"),

@@ -68,8 +68,13 @@ class CellRecord:
     env_steps: int = 0
     config: StoredConfig = field(default_factory=StoredConfig)
     versions: Mapping[str, str | None] = field(default_factory=dict)
-    """Package -> version; None: not installed."""
+    """Package -> version, those that decide numbers, Python and the C library; None: not installed."""
+    code: Mapping[str, Any] = field(default_factory=dict)
+    """Version, commit, whether files differ from it, and their fingerprint; empty in cells of version 0.1.0."""
     host: Mapping[str, Any] = field(default_factory=dict)
+    """The machine; cells of version 0.1.0 name no instruction sets."""
+    earlier: tuple[Mapping[str, Any], ...] = ()
+    """`conditions` of the earlier parts of a cell that was resumed under others."""
     pid: int | None = None
     timings: Timings = Timings()
     failure: Failure | None = None
@@ -78,6 +83,11 @@ class CellRecord:
     def threads(self) -> int:
         """Number of cores of the cell."""
         return int(self.host.get("threads", 1))
+
+    @property
+    def conditions(self) -> dict[str, Any]:
+        """What numbers depend on in addition to the configuration, as JSON values."""
+        return {"code": dict(self.code), "versions": dict(self.versions), "host": dict(self.host)}
 
     @classmethod
     def read(cls, folder: Path) -> CellRecord | None:
@@ -118,8 +128,8 @@ class CellRecord:
             "label": self.label,
             "env_steps": self.env_steps,
             "config": self.config.to_json(),
-            "versions": dict(self.versions),
-            "host": dict(self.host),
+            **self.conditions,
+            "earlier": list(self.earlier),
             "pid": self.pid,
             "timings": asdict(self.timings),
             "failure": None if self.failure is None else asdict(self.failure),
@@ -150,7 +160,9 @@ class CellRecord:
             env_steps=int(content["env_steps"]),
             config=StoredConfig.from_json(content["config"]),
             versions=dict(content["versions"].items()),
+            code=dict(content.get("code", {}).items()),
             host=dict(content["host"].items()),
+            earlier=tuple(dict(part.items()) for part in content.get("earlier", ())),
             pid=content.get("pid"),
             timings=Timings(**content["timings"]),
             failure=None if failure is None else Failure(str(failure["message"]), str(failure["traceback"])),

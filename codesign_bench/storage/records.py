@@ -19,6 +19,9 @@ CELL_FILE = "cell.json"
 SCHEMA = 2
 """Version 1 stored the first four axes of the variant as top-level entries, and no other axes."""
 
+FORMER_LABELS = {"GNN-PPO (paper's)": "GNN-PPO"}
+"""Labels in stored cells that are the same for both credits of the design step -> the method's label since."""
+
 RUNNING, DONE, FAILED = "running", "done", "failed"
 INTERRUPTED = "interrupted"
 """Not stored: the status of a cell that is recorded as running while no process holds its lock."""
@@ -155,7 +158,7 @@ class CellRecord:
             variant=Variant.from_json(axes),
             seed=int(content["seed"]),
             profile=_text(content, "profile"),
-            label=str(content.get("label") or content["method"]),
+            label=_label(content),
             status=status,
             env_steps=int(content["env_steps"]),
             config=StoredConfig.from_json(content["config"]),
@@ -172,6 +175,15 @@ class CellRecord:
 def now() -> str:
     """Return the current time, UTC, in the format of records."""
     return datetime.now(timezone.utc).isoformat(timespec="seconds")
+
+
+def _label(content: Mapping[str, Any]) -> str:
+    """Return the label, with the credit of the design step where a former label leaves it out."""
+    label = str(content.get("label") or content["method"])
+    if label not in FORMER_LABELS:
+        return label
+    credit = content["config"]["method"].get("design_credit", {}).get("value")
+    return FORMER_LABELS[label] if credit is None else f"{FORMER_LABELS[label]}, {credit} credit"
 
 
 def _text(content: Mapping[str, Any], name: str) -> str:

@@ -81,7 +81,7 @@ def describe(resolved: ResolvedCell, before: CellRecord | None) -> CellRecord:
         variant=cell.variant,
         seed=cell.seed,
         profile=cell.profile,
-        label=resolved.method_class.label,
+        label=resolved.method_class.label_of(config.method),
         env_steps=0 if before is None else before.env_steps,
         config=config.stored(),
         versions=package_versions(),

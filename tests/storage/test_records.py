@@ -128,3 +128,17 @@ def test_an_ended_record_keeps_its_start(tmp_path: Path) -> None:
 )
 def test_the_last_line_of_a_failure(failure: Failure, line: str) -> None:
     assert failure.last_line == line
+
+
+@pytest.mark.parametrize(
+    ("method", "label"),
+    [
+        ({"design_credit": {"value": "separate", "source": "default"}}, "GNN-PPO, separate credit"),
+        ({"design_credit": {"value": "joint", "source": "--set"}}, "GNN-PPO, joint credit"),
+        ({}, "GNN-PPO"),
+    ],
+)
+def test_a_former_label_gets_the_credit_of_the_design_step(method: dict[str, Any], label: str) -> None:
+    config = {**VERSION_0_1_0["config"], "method": method}
+    assert CellRecord.from_json({**VERSION_0_1_0, "label": "GNN-PPO (paper's)", "config": config}).label == label
+    assert CellRecord.from_json({**VERSION_0_1_0, "config": config}).label == "GNN-PPO"

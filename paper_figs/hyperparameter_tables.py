@@ -134,7 +134,10 @@ def _with_printed(rows: pd.DataFrame) -> pd.DataFrame:
 
     def shown(row: pd.Series) -> str:
         used, printed = str(row[PROFILES[0]]), str(row["printed_value"])
-        return DIFFERENT.format(used=used, printed=printed) if row[f"{PROFILES[0]}_differs"] else used
+        if not row[f"{PROFILES[0]}_differs"]:
+            return used
+        text = DIFFERENT.format(used=used, printed=printed)
+        return text if len(text) < WRAPPED_FROM else text.replace(" (paper", "\n(paper")
 
     return rows.assign(**{PROFILES[0]: [shown(row) for _, row in rows.iterrows()]})
 
@@ -184,10 +187,14 @@ def _over_tasks(rows: pd.DataFrame, profile: str) -> pd.DataFrame:
 
 
 def _wrapped(text: str) -> str:
-    """Break a long list of numbers in the middle."""
-    parts = text.split(", ")
-    if len(text) < WRAPPED_FROM or len(parts) < 2:
-        return text
+    """Break long lists of numbers in the middle."""
+    return "\n".join(_broken(line) for line in text.split("\n"))
+
+
+def _broken(line: str) -> str:
+    parts = line.split(", ")
+    if len(line) < WRAPPED_FROM or len(parts) < 2:
+        return line
     half = (len(parts) + 1) // 2
     return ", ".join(parts[:half]) + ",\n" + ", ".join(parts[half:])
 

@@ -51,6 +51,14 @@ def test_the_picture_holds_the_scene_then_each_profile_over_the_tasks_in_the_pap
     assert [laptop[2, column] for column in range(3)] == ["Batch Size", "10000", "10000"]
 
 
+def test_long_values_that_differ_stand_in_lines_of_their_own() -> None:
+    frame = pd.DataFrame(
+        [row("push", "scene", "control_action_min", *2 * ["(-1.0, -1.0)"], printed="(-1.0, -1.0, -0.2, -0.2)")]
+    )
+    cells = figure.draw(frame).axes[0].tables[0].get_celld()
+    assert cells[1, 1].get_text().get_text() == "(-1.0, -1.0)\n(paper: (-1.0, -1.0,\n-0.2, -0.2))"
+
+
 def test_the_picture_leaves_out_what_the_papers_tables_lack() -> None:
     assert not any("Gamma" in part.values() for part in pictured())
 

@@ -11,7 +11,25 @@ from typing import Any
 
 from codesign_bench import __version__
 
-PACKAGES = ("numpy", "torch", "pymunk", "pybullet", "cma", "gymnasium")
+PACKAGES = ("numpy", "torch", "scipy", "pymunk", "pybullet", "cma", "gymnasium")
+"""Those that decide numbers."""
+C_LIBRARY = "c_library"
+"""Beside the packages: the library whose sine and exponential the physics engines call."""
+INSTRUCTION_SETS = (
+    *("avx", "fma", "avx2", "avx512f", "avx512_bf16", "avx512_fp16", "amx_tile", "amx_bf16"),
+    *("asimd", "sve", "sve2", "bf16"),
+)
+"""CPU flags by which numerical libraries choose how to compute: those of x86 and those of ARM."""
+LIBRARY_SETTINGS = (
+    "ATEN_CPU_CAPABILITY",
+    "MKL_ENABLE_INSTRUCTIONS",
+    "MKL_CBWR",
+    "ONEDNN_MAX_CPU_ISA",
+    "OPENBLAS_CORETYPE",
+    "NPY_DISABLE_CPU_FEATURES",
+    "GLIBC_TUNABLES",
+)
+"""Environment variables that make these libraries choose otherwise."""
 BFLOAT16_FLAGS = ("amx_bf16", "avx512_bf16", "bf16")
 """CPU flags that indicate bfloat16 arithmetic: two of x86 (Intel, AMD) and one of ARM."""
 
@@ -24,9 +42,10 @@ def available_cores() -> int:
 
 
 def package_versions() -> dict[str, str | None]:
-    """Return the versions of Python, of this package and of `PACKAGES` without importing these; None: not installed.
+    """Return the versions of Python, of this package, of `PACKAGES` and of the C library; None: not installed.
 
-    This package's is that of the code that runs: what `pip` knows of a checkout is as old as its last installation.
+    No package is imported. This package's version is that of the code that runs: what `pip` knows of a checkout is as
+    old as its last installation.
     """
     found: dict[str, str | None] = {"python": platform.python_version(), "codesign_bench": __version__}
     for name in PACKAGES:
@@ -34,15 +53,23 @@ def package_versions() -> dict[str, str | None]:
             found[name] = version(name)
         except PackageNotFoundError:
             found[name] = None
+    found[C_LIBRARY] = " ".join(platform.libc_ver()).strip() or None
     return found
 
 
 def host_facts(threads: int) -> dict[str, Any]:
-    """Return the machine's name, system, processor and number of cores, and the threads per cell."""
+    """Return the machine's name, system, processor and number of cores, and the threads per cell.
+
+    Of the processor: its model, its architecture, its `INSTRUCTION_SETS`, and `LIBRARY_SETTINGS` that are set.
+    """
+    flags = _flags()
     return {
         "name": socket.gethostname(),
         "system": platform.platform(),
         "cpu": _processor(),
+        "architecture": platform.machine(),
+        "instruction_sets": [name for name in INSTRUCTION_SETS if name in flags],
+        "library_settings": {name: os.environ[name] for name in LIBRARY_SETTINGS if os.environ.get(name)},
         "cores": os.cpu_count(),
         "threads": threads,
     }
@@ -50,20 +77,26 @@ def host_facts(threads: int) -> dict[str, Any]:
 
 def computes_in_bfloat16() -> bool:
     """Return whether this processor has bfloat16 matrix products; without them, bfloat16 is slower than fp32."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return False
-    flags = {
-        flag for line in lines if line.startswith(("flags", "Features")) for flag in line.partition(":")[2].split()
+    return not _flags().isdisjoint(BFLOAT16_FLAGS)
+
+
+def _flags() -> set[str]:
+    """Return the CPU flags; empty where the system does not tell them in Linux's way."""
+    return {
+        flag
+        for line in _cpu_lines()
+        if line.startswith(("flags", "Features"))
+        for flag in line.partition(":")[2].split()
     }
-    return not flags.isdisjoint(BFLOAT16_FLAGS)
 
 
 def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        lines = []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    names = [line.partition(":")[2].strip() for line in _cpu_lines() if line.startswith("model name")]
     return names[0] if names else platform.processor() or platform.machine()
+
+
+def _cpu_lines() -> list[str]:
+    try:
+        return Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return []

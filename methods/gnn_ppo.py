@@ -1,5 +1,7 @@
 """The paper's own framework: goal-conditioned designer and controller as graph networks, trained jointly by PPO.
 
+With `design_credit="joint"`, as in the profile `paper`. With `separate`, the default, it is our variant of it.
+
 Source: the paper, sections "Policy learning" and "Training Hyperparameters & Architecture Details for Our Framework".
 """
 
@@ -64,8 +66,13 @@ class GnnPpo(PPOMethod[Config]):
     """Designer and controller as graph networks, conditioned on the goal, trained together by PPO."""
 
     name = "gnn_ppo"
-    label = "GNN-PPO (paper's)"
+    label = "GNN-PPO"
     config_class = Config
+
+    @classmethod
+    def label_of(cls, config: Config) -> str:
+        """Return the name with the credit of the design step: with `joint` it is the paper's method, else a variant."""
+        return f"{cls.label}, {config.design_credit} credit"
 
     @classmethod
     def small(cls) -> Mapping[str, Any]:

@@ -1,7 +1,8 @@
-"""The paper's tables of hyperparameters, from the resolved configurations of the profiles `paper` and `laptop`.
+"""What runs beside what the paper's tables of hyperparameters print; differences are marked.
 
-The paper has one table per task for its own method and one for the baselines; our text files have the same. The picture
-has the rows of the paper's six tables.
+Scenes are as the tasks define them, methods as the profiles `paper` and `laptop` resolve them. The paper has one table
+per task for its scene and its own method, and one for the baselines. Our text files have the same, with the scene in a
+separate table; the picture has the rows of the paper's six tables.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ from ._style import PAGE_WIDTH, in_order, style
 TITLE = "Hyperparameters"
 SOURCE = hyperparameters_of_results
 PROFILES = ("paper", "laptop")
-NEEDED = ("task", "method", "label", "name", *PROFILES, *(f"{profile}_source" for profile in PROFILES))
+OF_PROFILES = (f"{profile}{ending}" for ending in ("", "_source", "_differs") for profile in PROFILES)
+NEEDED = ("task", "method", "label", "name", "printed_value", *OF_PROFILES)
 SCENE, OWN = "scene", "gnn_ppo"
 """In the column `method`: the scene, and the paper's own method."""
 LEARNER_ROWS = tuple(field.name for field in fields(LearnerTable))
@@ -57,10 +59,12 @@ NAME_SHARE = 0.17
 WRAPPED_FROM = 24
 """Longer texts are broken into two lines."""
 ABSENT = "-"
+DIFFERENT = "{used} (paper: {printed})"
+"""What the picture shows where the value in use is not the printed one."""
 
 
 def data(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return every hyperparameter of every method on every task under both profiles.
+    """Return every number of every scene and every hyperparameter of every method on every task under both profiles.
 
     Args:
         frame: columns `NEEDED`: one row per task, method and hyperparameter.
@@ -80,12 +84,14 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
 def draw(frame: pd.DataFrame) -> Figure:
     """Return the paper's rows as a picture: the scene, then the paper's own method under each profile, over the tasks.
 
+    A scene's value that is not the printed one is followed by the printed one.
+
     Raises:
         UserError: as `data` does.
     """
     table = data(frame)
     learner = table[(table["method"] == OWN) & table["name"].isin(LEARNER_ROWS)]
-    parts = {"scene, in every profile": _over_tasks(table[table["method"] == SCENE], PROFILES[0])}
+    parts = {"scene, in every profile": _over_tasks(_with_printed(table[table["method"] == SCENE]), PROFILES[0])}
     for profile in PROFILES:
         parts[f"{OWN}, profile {profile}"] = _over_tasks(learner, profile)
     parts = {title: part for title, part in parts.items() if len(part)}
@@ -123,16 +129,37 @@ def _place(name: str) -> int:
     return LEARNER_ROWS.index(name) if name in LEARNER_ROWS else len(LEARNER_ROWS)
 
 
+def _with_printed(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return rows in which each value that is not the printed one is followed by it."""
+
+    def shown(row: pd.Series) -> str:
+        used, printed = str(row[PROFILES[0]]), str(row["printed_value"])
+        if not row[f"{PROFILES[0]}_differs"]:
+            return used
+        text = DIFFERENT.format(used=used, printed=printed)
+        return text if len(text) < WRAPPED_FROM else text.replace(" (paper", "\n(paper")
+
+    return rows.assign(**{PROFILES[0]: [shown(row) for _, row in rows.iterrows()]})
+
+
 def _tables(table: pd.DataFrame) -> list[tuple[str, list[str], list[list[str]]]]:
-    """Return title, header and rows of every table: one per task for the paper's method, one per other method."""
+    """Return title, header and rows of every table: two per task, of its scene and of the paper's method, one per other
+    method.
+    """
     result = []
-    header = ["hyperparameter", *PROFILES, *(f"source ({profile})" for profile in PROFILES)]
+    sources, scene_columns = [f"{profile}_source" for profile in PROFILES], [PROFILES[0], f"{PROFILES[0]}_differs"]
     for task in dict.fromkeys(table["task"]):
-        of_task = table[table["task"] == task]
+        of_task, name = table[table["task"] == task], str(task).replace("_", " ")
+        scene = of_task[of_task["method"] == SCENE]
+        if len(scene):
+            columns = ["printed", "printed_value", *scene_columns, sources[0]]
+            header = ["scene", "paper", "ours", "", "source of ours"]
+            result.append((f"{name}: scene, in every profile", header, scene[columns].values.tolist()))
         own = of_task[of_task["method"] == OWN].sort_values("name", key=lambda names: names.map(_place), kind="stable")
-        rows = pd.concat([of_task[of_task["method"] == SCENE], own])
-        columns = ["printed", *PROFILES, *(f"{profile}_source" for profile in PROFILES)]
-        result.append((f"{task.replace('_', ' ')}: scene and {OWN}", header, rows[columns].values.tolist()))
+        if len(own):
+            columns = ["printed", PROFILES[0], PROFILES[1], f"{PROFILES[1]}_differs", *sources]
+            header = ["hyperparameter", *PROFILES, "", *(f"source ({profile})" for profile in PROFILES)]
+            result.append((f"{name}: {OWN}", header, own[columns].values.tolist()))
     for method in in_order(set(table["method"]) - {SCENE, OWN}):
         own = table[table["method"] == method]
         rows = [
@@ -160,10 +187,14 @@ def _over_tasks(rows: pd.DataFrame, profile: str) -> pd.DataFrame:
 
 
 def _wrapped(text: str) -> str:
-    """Break a long list of numbers in the middle."""
-    parts = text.split(", ")
-    if len(text) < WRAPPED_FROM or len(parts) < 2:
-        return text
+    """Break long lists of numbers in the middle."""
+    return "\n".join(_broken(line) for line in text.split("\n"))
+
+
+def _broken(line: str) -> str:
+    parts = line.split(", ")
+    if len(line) < WRAPPED_FROM or len(parts) < 2:
+        return line
     half = (len(parts) + 1) // 2
     return ", ".join(parts[:half]) + ",\n" + ", ".join(parts[half:])
 

@@ -54,6 +54,7 @@ from ._deployed import (
 from ._scene import COLOURS, Clock, nearest_clear_shift
 
 PAPER = "paper, table of fetch cube"
+MOVES = "paper, its first three entries; that tools are not turned: ours, after the paper's text"
 UNSEEN = 'paper, section "Generalization to Unseen Goals Experiment Details"'
 
 PAPER_ORIGIN: Annotated[float, Given("m", OURS)] = 1.2
@@ -94,6 +95,10 @@ GROUND_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.001
 """Gap between the tallest link and the table."""
 START_CLEARANCE: Annotated[float, Given("m", OURS)] = 0.005
 """A tool that would start closer to the cube than this is shifted to the left or right, whichever is nearer."""
+CONTROL_MIN: Annotated[Triple, Given("1", MOVES, "control_action_min")] = (-1.0, -1.0, -1.0)
+"""Lower bounds of a control along x, y and z, before scaling."""
+CONTROL_MAX: Annotated[Triple, Given("1", MOVES, "control_action_max")] = (1.0, 1.0, 1.0)
+"""Upper bounds of a control, before scaling."""
 STEP_LENGTH: Annotated[float, Given("m", OURS, "control_action_scale")] = 0.02
 """Largest displacement of the held point in one control step, in the plane and vertically. The paper's scale would mean
 up to 2.4 m/s, and cubes would be shot off the table."""
@@ -167,10 +172,11 @@ DESIGN = Box.of(
 )
 LINK_SIZES, JOINT_ANGLES = DESIGN.group("link_"), DESIGN.group("joint_")
 
-CONTROL = Box.of(
-    move_x=(-STEP_LENGTH, STEP_LENGTH, "m"),
-    move_y=(-STEP_LENGTH, STEP_LENGTH, "m"),
-    move_z=(-STEP_LENGTH, STEP_LENGTH, "m"),
+CONTROL = Box(
+    names=("move_x", "move_y", "move_z"),
+    low=tuple(STEP_LENGTH * bound for bound in CONTROL_MIN),
+    high=tuple(STEP_LENGTH * bound for bound in CONTROL_MAX),
+    units=("m", "m", "m"),
 )
 IN_PLANE = CONTROL.slice("move_x", "move_y")
 
@@ -413,7 +419,7 @@ class _FetchCubeSimulator(BulletSimulator):
         """Move the held points by `controls` (b, C) in one control step and reward the cubes' approach to the base."""
         pose = self.pose[slots]
         length = np.maximum(1.0, np.sqrt((controls[:, IN_PLANE] ** 2).sum(axis=1)))
-        move = STEP_LENGTH * controls
+        move = CONTROL.bounds[1] * controls
         move[:, IN_PLANE] /= length[:, None]
         self.drive(slots, np.clip(pose + move, self.low[slots], self.high) - pose)
         self.advance(slots)

@@ -57,6 +57,7 @@ from ._scene import COLOURS, Clock
 
 PAPER = "paper, table of lift cup"
 CUP_RANGE = "ours; the paper's real cups lie within"
+MOVES = "paper, its first three entries; that tools are not turned: ours, after the paper's text"
 
 TOOL_START: Annotated[Floats, Given("m", PAPER, "tool_position_init")] = np.array([0.0, 1.2, 0.05])
 """Where the held end of the handle starts; z is measured from the table top (ours)."""
@@ -82,6 +83,10 @@ WORKSPACE: Annotated[Box, Given("m", OURS)] = Box.of(
     held_x=(-0.15, 0.15, "m"), held_y=(1.1, 1.75, "m"), held_z=(0.0, 0.7, "m")
 )
 """Range of the held end; a tool's lowest point limits z further."""
+CONTROL_MIN: Annotated[Triple, Given("1", MOVES, "control_action_min")] = (-1.0, -1.0, -1.0)
+"""Lower bounds of a control along x, y and z, before scaling."""
+CONTROL_MAX: Annotated[Triple, Given("1", MOVES, "control_action_max")] = (1.0, 1.0, 1.0)
+"""Upper bounds of a control, before scaling."""
 MAX_MOVE: Annotated[float, Given("m", OURS, "control_action_scale")] = 0.02
 """Largest displacement of the held end in a control step: 0.48 m/s, too slow to knock a cup away; the paper's scale
 would be 2.4 m/s."""
@@ -171,6 +176,12 @@ DESIGN = Box.of(
     prong_height=_HEIGHT,
 )
 
+CONTROL = Box(
+    names=("move_x", "move_y", "move_z"),
+    low=tuple(MAX_MOVE * bound for bound in CONTROL_MIN),
+    high=tuple(MAX_MOVE * bound for bound in CONTROL_MAX),
+    units=("m", "m", "m"),
+)
 INSTANCE = Box.of(
     cup_width_scale=(*CUP_WIDTHS, f"{CUP_UNIT:g} m"),
     cup_height_scale=(*CUP_HEIGHTS, f"{CUP_UNIT:g} m"),
@@ -261,9 +272,7 @@ class LiftCup(Task):
     control_period = CLOCK.control_period
     design_space = DESIGN
     tool_graph = FORK_GRAPH
-    control_space = Box.of(
-        move_x=(-MAX_MOVE, MAX_MOVE, "m"), move_y=(-MAX_MOVE, MAX_MOVE, "m"), move_z=(-MAX_MOVE, MAX_MOVE, "m")
-    )
+    control_space = CONTROL
     instance_space = INSTANCE
     goal_size = 2
     state_space = STATE
@@ -506,7 +515,7 @@ class _LiftCupSimulator(BulletSimulator):
         length = np.linalg.norm(controls, axis=1, keepdims=True)
         low, high = (np.tile(bound, (len(slots), 1)) for bound in WORKSPACE.bounds)
         low[:, 2] = self.lowest_hold[slots]
-        target = np.clip(pose + controls * (MAX_MOVE / np.maximum(1.0, length)), low, high)
+        target = np.clip(pose + controls * (CONTROL.bounds[1] / np.maximum(1.0, length)), low, high)
         self.drive(slots, target - pose)
         self.advance(slots)
         self.read_tools(slots)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import subprocess
@@ -11,7 +12,15 @@ import numpy as np
 import pytest
 
 import codesign_bench
-from codesign_bench.machine import PACKAGES, available_cores, computes_in_bfloat16, host_facts, package_versions
+from codesign_bench.machine import (
+    C_LIBRARY,
+    INSTRUCTION_SETS,
+    PACKAGES,
+    available_cores,
+    computes_in_bfloat16,
+    host_facts,
+    package_versions,
+)
 
 BOUND = pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="this system binds no process to cores")
 
@@ -33,7 +42,7 @@ def test_a_process_that_is_bound_to_one_core_has_one() -> None:
 
 def test_versions_are_those_of_what_is_imported() -> None:
     versions = package_versions()
-    assert set(versions) == {"python", "codesign_bench", *PACKAGES}
+    assert set(versions) == {"python", "codesign_bench", *PACKAGES, C_LIBRARY}
     assert versions["python"] == platform.python_version()
     assert versions["numpy"] == np.__version__
     assert versions["codesign_bench"] == codesign_bench.__version__
@@ -53,6 +62,22 @@ def test_the_host_is_named_with_its_processor_and_the_threads_of_a_cell() -> Non
     assert (facts["name"], facts["system"]) == (platform.node(), platform.platform())
     assert (facts["cores"], facts["threads"]) == (os.cpu_count(), 3)
     assert facts["cpu"]
+    assert facts["architecture"] == platform.machine()
+    assert json.loads(json.dumps(facts)) == facts
+
+
+def test_instruction_sets_are_the_processors_flags_and_settings_those_of_the_environment(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    lines = subprocess.run(["cat", "/proc/cpuinfo"], capture_output=True, text=True).stdout
+    told = [name for name in INSTRUCTION_SETS if f" {name} " in lines.replace("\n", " ")]
+    for name in ("ATEN_CPU_CAPABILITY", "MKL_CBWR"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Haswell")
+    facts = host_facts(threads=1)
+    assert facts["instruction_sets"] == told
+    assert facts["library_settings"]["OPENBLAS_CORETYPE"] == "Haswell"
+    assert not {"ATEN_CPU_CAPABILITY", "MKL_CBWR"} & set(facts["library_settings"])
 
 
 def test_bfloat16_is_known_by_the_flags_of_the_processor() -> None:

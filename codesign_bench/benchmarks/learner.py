@@ -24,6 +24,7 @@ import numpy as np
 from rich.console import Console
 
 from codesign_bench.benchmarks.workload import Speed, Workload, peak_megabytes, together
+from codesign_bench.code_version import code_version
 from codesign_bench.config.resolve import resolve
 from codesign_bench.console import print_table
 from codesign_bench.errors import UserError
@@ -200,6 +201,7 @@ def _write(out: Path, work: Workload, top: Mapping[str, float], found: Mapping[s
             for name, speed in found.items()
         },
         "versions": package_versions(),
+        "code": code_version().to_json(),
         "host": host_facts(work.cores),
     }
     try:

@@ -19,6 +19,8 @@ from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.console import Log, print_table, printer
 from codesign_bench.errors import UserError
 from codesign_bench.seeding import generator
+from codesign_bench.storage import provenance
+from codesign_bench.storage.cells import find_cells
 from codesign_bench.storage.files import write_bytes, write_json
 from codesign_bench.text_tables import markdown
 
@@ -99,10 +101,11 @@ def verify(study: Claimant, results: Path, out: Path, console: Console, *, measu
         _measure(claims, evidence, results, log)
         evidence = load_evidence(results)
     rows = judge(claims, evidence, str(results))
-    paths = write_rows(rows, study, results, out)
+    made = provenance.differences({results.name: provenance.records_of(find_cells(results))})
+    paths = write_rows(rows, study, results, out, made)
     print_rows(rows, console)
-    for path in paths:
-        log(str(path))
+    for line in (*made, *map(str, paths)):
+        log(line)
 
 
 def _measure(claims: Sequence[Claim], evidence: Evidence, results: Path, log: Log) -> None:
@@ -141,8 +144,8 @@ def missing(rows: Sequence[Row]) -> list[str]:
     return list(dict.fromkeys(command for row in rows if row.asked for command in row.needs))
 
 
-def write_rows(rows: Sequence[Row], study: Claimant, results: Path, out: Path) -> list[Path]:
-    """Write the rows as Markdown and JSON to `out` and return the paths.
+def write_rows(rows: Sequence[Row], study: Claimant, results: Path, out: Path, made: Sequence[str] = ()) -> list[Path]:
+    """Write the rows as Markdown and JSON into `out` and return the paths; `made` tells how cells were made otherwise.
 
     Raises:
         UserError: `out` is not writable.
@@ -150,19 +153,20 @@ def write_rows(rows: Sequence[Row], study: Claimant, results: Path, out: Path) -
     paths = [out / JSON_FILE, out / MARKDOWN_FILE]
     try:
         out.mkdir(parents=True, exist_ok=True)
-        write_json(paths[0], as_json(rows, study, results))
-        write_bytes(paths[1], as_markdown(rows, study, results).encode())
+        write_json(paths[0], as_json(rows, study, results, made))
+        write_bytes(paths[1], as_markdown(rows, study, results, made).encode())
     except OSError as error:
         raise UserError(f"--out {out}: not writable ({error.strerror})") from error
     return paths
 
 
-def as_json(rows: Sequence[Row], study: Claimant, results: Path) -> dict[str, Any]:
-    """Return all data of each claim as JSON values; non-finite numbers are None or text."""
+def as_json(rows: Sequence[Row], study: Claimant, results: Path, made: Sequence[str] = ()) -> dict[str, Any]:
+    """Return everything that is known of each claim, as JSON values; what is not finite is None or text."""
     return {
         "version": __version__,
         "study": study.name,
         "results": str(results),
+        "made": list(made),
         "interval": {"kind": "percentile bootstrap", "confidence": stats.CONFIDENCE, "resamples": stats.RESAMPLES},
         "claims": [
             {
@@ -186,8 +190,8 @@ def as_json(rows: Sequence[Row], study: Claimant, results: Path) -> dict[str, An
     }
 
 
-def as_markdown(rows: Sequence[Row], study: Claimant, results: Path) -> str:
-    """Return the page: the table of claims, their rules, and the commands for missing data."""
+def as_markdown(rows: Sequence[Row], study: Claimant, results: Path, made: Sequence[str] = ()) -> str:
+    """Return the page: the table of claims, the rules that judged them, and the commands for missing data."""
     asked = [row for row in rows if row.asked]
     header = ("claim", "verdict", "statistic [95 % interval]", "n", "rule", "source", "note")
     table = [
@@ -215,6 +219,8 @@ def as_markdown(rows: Sequence[Row], study: Claimant, results: Path) -> str:
         "## Rules\n",
         markdown(("rule", "statistic", "verdict"), [(kind, *words) for kind, words in rules.items()]),
     ]
+    if made:
+        parts += ["## How the cells were made\n", provenance.as_markdown(made)]
     if missing(rows):
         parts += ["## Data that are missing\n", "```\n" + "\n".join(missing(rows)) + "\n```\n"]
     return "\n".join(parts)

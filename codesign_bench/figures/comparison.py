@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from codesign_bench.storage.cells import find_cells
 from codesign_bench.storage.frames import LABEL_COLUMN, load_results
+from codesign_bench.storage.provenance import differences, records_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,6 +35,26 @@ def with_compared(own: pd.DataFrame, other: Path) -> pd.DataFrame:
     origin = FROM + other.resolve().name
     renamed = {name: compared[name] + origin for name in ("method", LABEL_COLUMN)}
     return pd.concat([own, compared.assign(**renamed)], ignore_index=True)
+
+
+def made_otherwise(own: Path, other: Path) -> list[str]:
+    """Return in a short paragraph how the finished cells of two results folders were made otherwise, on shared tasks.
+
+    Raises:
+        UserError: one of the folders does not exist.
+    """
+    records = {folder: records_of(find_cells(folder)) for folder in (own, other)}
+    shared = {record.task for record in records[own]} & {record.task for record in records[other]}
+    names = _names(own, other)
+    return differences(
+        {names[folder]: [record for record in found if record.task in shared] for folder, found in records.items()}
+    )
+
+
+def _names(own: Path, other: Path) -> dict[Path, str]:
+    """Return a name for each of two folders: its last part, or the whole path where that is the same for both."""
+    short = {folder: folder.resolve().name for folder in (own, other)}
+    return short if len(set(short.values())) == 2 else {folder: str(folder) for folder in (own, other)}
 
 
 def method_of(name: str) -> str:

@@ -19,7 +19,7 @@ import pandas as pd
 
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
-from codesign_bench.figures.comparison import with_compared
+from codesign_bench.figures.comparison import made_otherwise, with_compared
 from codesign_bench.figures.source import Request, Source, curves
 from codesign_bench.registry import load_module, names
 from codesign_bench.storage.files import write_bytes
@@ -60,7 +60,7 @@ def draw_figures(
         wanted: names of figures; none: those of `study`.
         results: folder of the cells.
         out: folder of the figures.
-        log: prints every path and what is left out.
+        log: prints every path, what is left out, and differences in how compared cells were made.
         compare: other results, whose curves are overlaid in figures with `COMPARES`.
         study: without names, its figures are drawn and those that belong to no study; None: the default study.
 
@@ -82,6 +82,8 @@ def draw_figures(
         drawn = [*save(drawing, out), *drawn]  # the first figure is logged last
     if not drawn:
         raise UserError(f"nothing in '{results}' can be plotted yet")
+    for line in made_otherwise(results, compare) if compare is not None else ():
+        log(line)
     for path in sorted(drawn, key=lambda path: path.suffix == ".png"):
         log(str(path))
 

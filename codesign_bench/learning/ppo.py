@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from codesign_bench.learning.ppo_config import PPOConfig
-from codesign_bench.task import Slots
+from codesign_bench.task import Booleans, Slots
 
 LogProbs = Callable[[Slots], tuple[Tensor, Tensor]]
 """Maps row indices (m,) to the log-probabilities (m,) of their actions and the mean entropy ()."""
@@ -126,11 +126,17 @@ def gradient_step(
     optimizer.step()
 
 
-def minibatches(count: int, size: int, rng: np.random.Generator) -> Iterator[Slots]:
-    """Yield a random partition of `count` rows into near-equal minibatches of about `size` rows."""
+def minibatches(count: int, size: int, rng: np.random.Generator, first: Booleans | None = None) -> Iterator[Slots]:
+    """Yield a random partition of `count` rows into near-equal minibatches of about `size` rows.
+
+    Rows that `first` (count,) marks come before all others; both kinds are shuffled.
+    """
+    order = rng.permutation(count)
+    if first is not None:
+        order = np.concatenate([order[first[order]], order[~first[order]]])
     # Near-equal parts: a fixed size would leave a remainder, possibly of one row, whose gradient is mostly noise but
     # moves Adam as far as any other.
-    yield from np.array_split(rng.permutation(count), max(1, round(count / size)))
+    yield from np.array_split(order, max(1, round(count / size)))
 
 
 def normalized(values: Tensor) -> Tensor:

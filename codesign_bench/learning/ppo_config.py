@@ -57,6 +57,8 @@ class PPOConfig:
     """Whether the value network learns returns normalised by their running mean and standard deviation."""
     design_credit: Credit = "separate"
     """Credit of the design step: `joint` (the paper's) or `separate` (ours)."""
+    batch_design: bool = field(default=False, metadata=OURS)
+    """Under joint credit, whether an epoch's first minibatches hold all design steps; False spreads them over all."""
     design_learning_rate: float = 7e-4
     """Adam's learning rate for the designer under separate credit."""
     design_epochs: int = field(default=10, metadata=OURS)

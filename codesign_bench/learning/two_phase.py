@@ -137,7 +137,8 @@ class TwoPhaseLearner:
         value = ValueUpdate(
             self._predict, optimizers["value"], steps.observation, estimates.target, config.max_gradient_norm
         )
-        self.loop.run((policy, value), rows, config.epochs, config.minibatch_size, self.streams["minibatches"])
+        first = steps.is_design.cpu().numpy()[rows] if config.batch_design else None
+        self.loop.run((policy, value), rows, config.epochs, config.minibatch_size, self.streams["minibatches"], first)
         return {"value_loss": value.loss, "kl": policy.divergence, "policy_steps": float(policy.steps)}
 
     def _old_log_prob(self, steps: Steps, log_probs: LogProbs, rows: Slots) -> Tensor:

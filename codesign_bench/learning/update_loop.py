@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from codesign_bench.learning.ppo import Update, minibatches
-from codesign_bench.task import Slots
+from codesign_bench.task import Booleans, Slots
 
 
 class UpdateLoop:
@@ -28,12 +28,21 @@ class UpdateLoop:
             self._threads = ThreadPoolExecutor(2, initializer=torch.set_num_threads, initargs=(1,))
 
     def run(
-        self, updates: Sequence[Update], rows: Slots, epochs: int, minibatch_size: int, rng: np.random.Generator
+        self,
+        updates: Sequence[Update],
+        rows: Slots,
+        epochs: int,
+        minibatch_size: int,
+        rng: np.random.Generator,
+        first: Booleans | None = None,
     ) -> None:
-        """Run every update on the same minibatches of `rows` (n,); the updates must not share parameters."""
+        """Run every update on the same minibatches of `rows` (n,); the updates must not share parameters.
+
+        The rows that `first` (n,) marks come first in every epoch.
+        """
         # All minibatches are drawn before any update runs: the order of threads, or a policy that stops early, then has
         # no effect on the random numbers of the other updates and of later batches.
-        parts = [rows[part] for _ in range(epochs) for part in minibatches(len(rows), minibatch_size, rng)]
+        parts = [rows[part] for _ in range(epochs) for part in minibatches(len(rows), minibatch_size, rng, first)]
 
         def learn(update: Update) -> None:
             for part in parts:

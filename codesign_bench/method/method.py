@@ -67,7 +67,7 @@ class Method(ABC, Generic[ConfigType]):
     name: ClassVar[str]
     """The method's name, which is also the name of its file."""
     label: ClassVar[str]
-    """The method's name in figures."""
+    """The method's name in figures; see `label_of`."""
     config_class: ClassVar[type]
     """Frozen dataclass of the hyperparameters; every field has a default, and any task runs with the defaults."""
 
@@ -75,6 +75,11 @@ class Method(ABC, Generic[ConfigType]):
         self.problem = problem
         self.config = config
         self.streams = streams
+
+    @classmethod
+    def label_of(cls, config: ConfigType) -> str:
+        """Return the method's name in figures under `config`; by default `label`."""
+        return cls.label
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Mapping[str, tuple[Any, str]]:

@@ -14,6 +14,7 @@ import jinja2
 import pandas as pd
 from markupsafe import Markup, escape
 
+from codesign_bench.code_version import code_version
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.figures.drawing import make_folder
@@ -21,6 +22,7 @@ from codesign_bench.stats import CELL_KEYS
 from codesign_bench.storage.files import write_bytes
 from codesign_bench.storage.frames import load_results
 from codesign_bench.storage.layout import CURVE_COLUMNS
+from codesign_bench.storage.provenance import differences
 from codesign_bench.study.study import DEFAULT_STUDY, Study, load_study
 
 from . import cells as cell_parts
@@ -53,6 +55,9 @@ class Page:
     """Unreadable cells."""
     cells: Table
     configurations: list[provenance.Configuration]
+    differences: list[str]
+    """How cells were made otherwise than others, where it can change numbers: a heading and a line per kind."""
+    commits: Table
     versions: Table
     machines: Table
     times: Table
@@ -99,11 +104,13 @@ def gather(results: Path, cells: Sequence[PageCell], damaged: list[str], study: 
         damaged=damaged,
         cells=cell_parts.cell_table(cells),
         configurations=provenance.configurations(cells),
+        differences=differences({results.name: [cell.record for cell in cells]}),
+        commits=provenance.code_table(cells),
         versions=provenance.version_table(cells),
         machines=provenance.machine_table(cells),
         times=provenance.time_table(cells),
         period=provenance.period(cells),
-        code=provenance.code_version(),
+        code=str(code_version()),
         made=datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
     )
 

@@ -1,25 +1,24 @@
-"""Provenance of the results: configurations with sources, versions, machines, times, and the code's commit."""
+"""Provenance of the results: configurations with sources, code, versions, machines and times."""
 
 from __future__ import annotations
 
 import json
-import subprocess
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from statistics import median
 from typing import Any
 
-import codesign_bench
 from codesign_bench.config.settings import METHOD, RUN
 from codesign_bench.console import duration
 from codesign_bench.registry import in_order
+from codesign_bench.storage.provenance import NOT_RECORDED, code, processor
 
 from .cells import PageCell
 from .tables import NOTHING, Table, listed
 
-GIT_SECONDS = 10.0
 ALL_CELLS = "all"
+OWN = "codesign_bench"
+"""Among the versions of a cell: that of the code itself."""
 
 
 @dataclass(frozen=True)
@@ -41,15 +40,23 @@ def configurations(cells: Sequence[PageCell]) -> list[Configuration]:
     return found
 
 
+def code_table(cells: Sequence[PageCell]) -> Table:
+    """Return the commits that cells were made by, with the cells of each."""
+    groups = _grouped(
+        cells, lambda cell: (str(cell.record.versions.get(OWN, NOT_RECORDED)), code(cell.record.conditions))
+    )
+    return Table(("codesign-bench", "commit", "cells"), [(*told, where(group, cells)) for told, group in groups])
+
+
 def version_table(cells: Sequence[PageCell]) -> Table:
     """Return the versions of tasks and packages that cells record, with the cells where they differ."""
-    packages = dict.fromkeys(name for cell in cells for name in cell.record.versions)
+    packages = dict.fromkeys(name for cell in cells for name in cell.record.versions if name != OWN)
     tasks = _grouped(cells, lambda cell: (cell.task, str(cell.record.task_version)))
     rows = [(f"task {task}", version, where(group, cells)) for (task, version), group in tasks]
     for name in packages:
 
         def version(cell: PageCell, name: str = name) -> str:
-            return str(cell.record.versions.get(name) or "not installed")
+            return str(cell.record.versions.get(name, NOT_RECORDED) or "not installed")
 
         rows += [(name, found, where(group, cells)) for found, group in _grouped(cells, version)]
     return Table(("task or package", "version", "cells"), rows)
@@ -57,9 +64,13 @@ def version_table(cells: Sequence[PageCell]) -> Table:
 
 def machine_table(cells: Sequence[PageCell]) -> Table:
     """Return the machines of the cells."""
-    names = ("name", "system", "cpu", "cores")
+
+    def facts_of(cell: PageCell) -> tuple[str, ...]:
+        host = cell.record.host
+        return str(host.get("name")), str(host.get("system")), processor(cell.record.conditions), str(host.get("cores"))
+
     rows = []
-    for facts, group in _grouped(cells, lambda cell: tuple(str(cell.record.host.get(name)) for name in names)):
+    for facts, group in _grouped(cells, facts_of):
         threads = sorted({str(cell.record.host.get("threads")) for cell in group})
         rows.append((*facts, ", ".join(threads), str(len(group))))
     header = ("machine", "system", "processor", "cores", "threads per cell", "cells")
@@ -88,19 +99,6 @@ def period(cells: Sequence[PageCell]) -> str:
     ended = [cell.record.timings.ended or "" for cell in cells]
     first, last = min(filter(None, started), default=NOTHING), max(filter(None, ended), default="not ended yet")
     return f"{_moment(first)} to {_moment(last)}"
-
-
-def code_version(folder: Path | None = None) -> str:
-    """Return the version of this code, and its commit if `folder` (default: the package's) is a git checkout of it."""
-    version = f"codesign-bench {codesign_bench.__version__}"
-    folder = folder or Path(codesign_bench.__file__).parent
-    try:
-        _git(folder, "ls-files", "--error-unmatch", "__init__.py")  # else the checkout is another project's
-        commit = _git(folder, "rev-parse", "HEAD")
-        changed = _git(folder, "status", "--porcelain", "--untracked-files=no")
-    except (OSError, subprocess.SubprocessError):
-        return version
-    return f"{version}, commit {commit[:12]}{', with uncommitted changes' if changed else ''}"
 
 
 def where(group: Sequence[PageCell], everything: Sequence[PageCell]) -> str:
@@ -155,8 +153,3 @@ def _median(seconds: Iterable[float | None]) -> str:
 def _moment(text: str) -> str:
     """Return a time of a cell file, which is UTC, to the minute."""
     return f"{text[:10]} {text[11:16]} UTC" if text[10:11] == "T" else text
-
-
-def _git(folder: Path, *arguments: str) -> str:
-    command = ["git", "-C", str(folder), *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=GIT_SECONDS, check=True).stdout.strip()

@@ -19,6 +19,9 @@ CELL_FILE = "cell.json"
 SCHEMA = 2
 """Version 1 stored the first four axes of the variant as top-level entries, and no other axes."""
 
+FORMER_LABELS = {"GNN-PPO (paper's)": "GNN-PPO"}
+"""Labels in stored cells that are the same for both credits of the design step -> the method's label since."""
+
 RUNNING, DONE, FAILED = "running", "done", "failed"
 INTERRUPTED = "interrupted"
 """Not stored: the status of a cell that is recorded as running while no process holds its lock."""
@@ -70,8 +73,13 @@ class CellRecord:
     env_steps: int = 0
     config: StoredConfig = field(default_factory=StoredConfig)
     versions: Mapping[str, str | None] = field(default_factory=dict)
-    """Package -> version; None: not installed."""
+    """Package -> version, those that decide numbers, Python and the C library; None: not installed."""
+    code: Mapping[str, Any] = field(default_factory=dict)
+    """Version, commit, whether files differ from it, and their fingerprint; empty in cells of version 0.1.0."""
     host: Mapping[str, Any] = field(default_factory=dict)
+    """The machine; cells of version 0.1.0 name no instruction sets."""
+    earlier: tuple[Mapping[str, Any], ...] = ()
+    """`conditions` of the earlier parts of a cell that was resumed under others."""
     pid: int | None = None
     timings: Timings = Timings()
     failure: Failure | None = None
@@ -80,6 +88,11 @@ class CellRecord:
     def threads(self) -> int:
         """Number of cores of the cell."""
         return int(self.host.get("threads", 1))
+
+    @property
+    def conditions(self) -> dict[str, Any]:
+        """What numbers depend on in addition to the configuration, as JSON values."""
+        return {"code": dict(self.code), "versions": dict(self.versions), "host": dict(self.host)}
 
     @classmethod
     def read(cls, folder: Path) -> CellRecord | None:
@@ -121,8 +134,8 @@ class CellRecord:
             "label": self.label,
             "env_steps": self.env_steps,
             "config": self.config.to_json(),
-            "versions": dict(self.versions),
-            "host": dict(self.host),
+            **self.conditions,
+            "earlier": list(self.earlier),
             "pid": self.pid,
             "timings": asdict(self.timings),
             "failure": None if self.failure is None else asdict(self.failure),
@@ -149,12 +162,14 @@ class CellRecord:
             variant=Variant.from_json(axes),
             seed=int(content["seed"]),
             profile=_text(content, "profile"),
-            label=str(content.get("label") or content["method"]),
+            label=_label(content),
             status=status,
             env_steps=int(content["env_steps"]),
             config=StoredConfig.from_json(content["config"]),
             versions=dict(content["versions"].items()),
+            code=dict(content.get("code", {}).items()),
             host=dict(content["host"].items()),
+            earlier=tuple(dict(part.items()) for part in content.get("earlier", ())),
             pid=content.get("pid"),
             timings=Timings(**content["timings"]),
             failure=None if failure is None else Failure(str(failure["message"]), str(failure["traceback"])),
@@ -164,6 +179,15 @@ class CellRecord:
 def now() -> str:
     """Return the current time, UTC, in the format of records."""
     return datetime.now(timezone.utc).isoformat(timespec="seconds")
+
+
+def _label(content: Mapping[str, Any]) -> str:
+    """Return the label, with the credit of the design step where a former label leaves it out."""
+    label = str(content.get("label") or content["method"])
+    if label not in FORMER_LABELS:
+        return label
+    credit = content["config"]["method"].get("design_credit", {}).get("value")
+    return FORMER_LABELS[label] if credit is None else f"{FORMER_LABELS[label]}, {credit} credit"
 
 
 def _text(content: Mapping[str, Any], name: str) -> str:

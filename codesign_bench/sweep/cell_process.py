@@ -11,11 +11,15 @@ import signal
 import sys
 import threading
 import traceback
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import filelock
 
 from codesign_bench.cell.cell import Cell, ResolvedCell, resolve_cell
+from codesign_bench.code_version import code_version
 from codesign_bench.errors import UserError
 from codesign_bench.machine import host_facts, package_versions
 from codesign_bench.plugins import import_modules
@@ -23,6 +27,7 @@ from codesign_bench.processes import EXIT_ORPHANED
 from codesign_bench.storage.checkpoint import remove_checkpoint
 from codesign_bench.storage.files import remove_partial_files
 from codesign_bench.storage.layout import CHECKPOINT_FILE, LOCK_FILE, LOG_FILE, PROGRESS_FILE, cell_lock
+from codesign_bench.storage.provenance import same_conditions
 from codesign_bench.storage.records import DONE, FAILED, CellRecord, Failure, Timings, now
 from codesign_bench.sweep.training import CellRun
 
@@ -69,21 +74,29 @@ def run_locked(cell: Cell, folder: Path, *, retry: bool) -> int:
 def describe(resolved: ResolvedCell, before: CellRecord | None) -> CellRecord:
     """Return the record of a running cell; `before` is the record of an interrupted run, if any."""
     cell, config = resolved.cell, resolved.config
-    return CellRecord(
+    record = CellRecord(
         task=cell.task,
         task_version=resolved.task.version,
         method=cell.method,
         variant=cell.variant,
         seed=cell.seed,
         profile=cell.profile,
-        label=resolved.method_class.label,
+        label=resolved.method_class.label_of(config.method),
         env_steps=0 if before is None else before.env_steps,
         config=config.stored(),
         versions=package_versions(),
+        code=code_version().to_json(),
         host=host_facts(config.run.threads),
         pid=os.getpid(),
         timings=Timings(started=now() if before is None else before.timings.started),
     )
+    return record if before is None else replace(record, earlier=_earlier(before, record))
+
+
+def _earlier(before: CellRecord, record: CellRecord) -> tuple[Mapping[str, Any], ...]:
+    """Return the conditions of the parts of an interrupted run that differ from those under which it is resumed."""
+    parts = (*before.earlier, before.conditions)
+    return tuple(part for part in parts if not same_conditions(part, record.conditions))
 
 
 def pin_threads() -> None:

@@ -21,11 +21,14 @@ def results(tmp_path: Path) -> Path:
 def test_curves_are_drawn_beside_those_that_they_are_compared_with(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    store_cell(tmp_path / "now", curve=rising(0.0, 2.0))
+    store_cell(tmp_path / "now", curve=rising(0.0, 2.0), code={"commit": "a" * 40, "fingerprint": "1f"})
     out = tmp_path / "figures"
     arguments = ["--results", str(tmp_path / "now"), "--compare", str(results), "--out", str(out)]
     assert main(["plot", "learning_curves", *arguments]) == 0
-    assert set(capsys.readouterr().out.splitlines()) == {str(path) for path in out.iterdir()}
+    printed = capsys.readouterr().out.splitlines()
+    assert set(printed[2:]) == {str(path) for path in out.iterdir()}
+    assert printed[0].startswith("These cells are not known to have been made alike")
+    assert printed[1] == "commits: aaaaaaaaaaaa (1 cell of now), not recorded (1 cell of before)"
     table = pd.read_csv(out / "learning_curves.csv")
     ends = table[(table["quantity"] == "return_mean") & (table["env_steps"] == 100)].set_index("method")["mean"]
     assert ends.to_dict() == {"gnn_ppo": 2.0, "gnn_ppo from before": 1.0}

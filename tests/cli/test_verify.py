@@ -31,6 +31,7 @@ def test_verify_prints_and_writes_a_row_for_each_claim(tmp_path: Path, capsys: p
     assert rows["steps.push.cma_rl"].split()[2] == "0.50"
     assert rows["tools_vary.push"].startswith("contradicted")
     assert rows["final_return.push.cma_es"].startswith("undecided")
+    assert printed[-3].startswith("commits: not recorded (all ")
     assert printed[-2:] == [str(out / "claims.json"), str(out / "claims.md")]
 
     content = json.loads((out / "claims.json").read_text())
@@ -41,6 +42,8 @@ def test_verify_prints_and_writes_a_row_for_each_claim(tmp_path: Path, capsys: p
     assert written["final_return.push.cma_rl"]["verdict"] == "supported"
     assert written["final_return.push.cma_es"]["value"] is None
     page = (out / "claims.md").read_text()
+    assert content["made"] == printed[-4:-2]
+    assert f"## How the cells were made\n\n{printed[-4]}\n\n- {printed[-3]}\n" in page
     assert {claim.name for claim in CLAIMS if claim.sentence in page} == set(rows)
 
 

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from builders import rising, store_cell
-from codesign_bench.figures.comparison import with_compared
+from codesign_bench.figures.comparison import made_otherwise, with_compared
 from codesign_bench.registry import load_module
 from codesign_bench.storage.frames import load_results
 
@@ -49,3 +49,18 @@ def test_compared_curves_are_dashed_in_their_methods_colour(own: pd.DataFrame, r
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert len(labels) == 3
     assert labels[-1].endswith("from before (n=3)")
+
+
+def test_how_compared_cells_were_made_otherwise_is_told_of_shared_tasks(tmp_path: Path) -> None:
+    for name, commit in (("now", "a" * 40), ("before", "b" * 40)):
+        store_cell(tmp_path / name, code={"commit": commit, "fingerprint": commit})
+    store_cell(tmp_path / "before", task="scoop", code={"commit": "c" * 40, "fingerprint": "3f"})
+    _, line = made_otherwise(tmp_path / "now", tmp_path / "before")
+    assert line == "commits: aaaaaaaaaaaa (1 cell of now), bbbbbbbbbbbb (1 cell of before)"
+
+
+def test_two_folders_of_one_name_are_told_apart_by_their_paths(tmp_path: Path) -> None:
+    for folder in ("one", "two"):
+        store_cell(tmp_path / folder / "runs", code={"commit": folder, "fingerprint": folder})
+    _, line = made_otherwise(tmp_path / "one" / "runs", tmp_path / "two" / "runs")
+    assert str(tmp_path / "two" / "runs") in line

@@ -161,6 +161,25 @@ def test_minibatches_are_a_partition_into_near_equal_parts(count: int, size: int
     assert max(map(len, found)) - min(map(len, found)) <= 1
 
 
+def test_marked_rows_fill_the_first_minibatches() -> None:
+    marked = np.isin(np.arange(10), [2, 3, 5, 9])
+    one, two, three, four, five = minibatches(10, 2, np.random.default_rng(0), marked)
+    assert {*one.tolist(), *two.tolist()} == {2, 3, 5, 9}
+    assert {*three.tolist(), *four.tolist(), *five.tolist()} == {0, 1, 4, 6, 7, 8}
+    mixed, rest = minibatches(10, 5, np.random.default_rng(0), marked)
+    assert {2, 3, 5, 9} < set(mixed.tolist())
+    assert sorted([*mixed.tolist(), *rest.tolist()]) == list(range(10))
+
+
+def test_marked_rows_and_the_others_keep_the_order_that_they_have_without_marks() -> None:
+    marked = np.arange(10) >= 6
+    plain, sorted_ = (
+        np.concatenate(list(minibatches(10, 5, np.random.default_rng(1), first))).tolist() for first in (None, marked)
+    )
+    assert sorted_ == [row for row in plain if row >= 6] + [row for row in plain if row < 6]
+    assert sorted_[:4] != sorted(sorted_[:4])
+
+
 def test_minibatches_are_shuffled_anew() -> None:
     rng = np.random.default_rng(0)
     first, second = (np.concatenate(list(minibatches(50, 10, rng))).tolist() for _ in range(2))

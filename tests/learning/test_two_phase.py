@@ -52,6 +52,30 @@ def test_the_divergence_limit_stops_the_policy_but_not_the_value(
     assert len(steps) == 4 * round(learned / 30)
 
 
+def test_design_steps_fill_the_first_minibatches_of_every_epoch_if_told(
+    make_learner: MakeLearner, recorder: Any
+) -> None:
+    settings = {"minibatch_size": 5, "epochs": 2, "kl_threshold": 1e9}
+    learner = make_learner(design_credit="joint", batch_design=True, loop=recorder, **settings)
+    batch = learner.collect(60, 10)
+    learner.update(batch)
+    designs = batch.is_design[batch.valid]
+    assert (designs.sum(), designs.size) == (12, 66)  # 13 minibatches: one of six rows, twelve of five
+    for update in (*recorder.policies, *recorder.values):
+        parts = [rows for other, rows in recorder.steps if other is update]
+        assert [int(designs[rows].sum()) for rows in parts] == 2 * ([6, 5, 1] + 10 * [0])
+        for epoch in (parts[:13], parts[13:]):
+            assert sorted(np.concatenate(epoch).tolist()) == list(range(66))
+
+
+def test_the_place_of_design_steps_changes_nothing_under_separate_credit(make_learner: MakeLearner) -> None:
+    learners = [make_learner(design_credit="separate", batch_design=told) for told in (False, True)]
+    for learner in learners:
+        learner.train(BUDGET)
+    one, other = (learner.state().arrays for learner in learners)
+    assert [name for name in one if not np.array_equal(one[name], other[name])] == []
+
+
 @CREDITS
 def test_a_restored_learner_resumes_bit_for_bit(make_learner: MakeLearner, credit: str) -> None:
     settings: dict[str, Any] = {"design_credit": credit, "fix_std": False, "final_learning_rate_fraction": 0.1}

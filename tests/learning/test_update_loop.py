@@ -33,6 +33,12 @@ def test_all_updates_see_the_same_minibatches_in_the_same_order(cores: int) -> N
     assert first[:2] != first[2:4], "each epoch has its own order"
 
 
+def test_marked_rows_come_first_in_every_epoch() -> None:
+    listener, rows = Listener(), np.arange(10, 20)
+    UpdateLoop().run((listener,), rows, 2, 5, np.random.default_rng(0), first=rows >= 15)
+    assert [sorted(part) for part in listener.parts] == 2 * [[15, 16, 17, 18, 19], [10, 11, 12, 13, 14]]
+
+
 def test_an_error_in_a_thread_is_raised() -> None:
     class Failing(Listener):
         def step(self, rows: Slots) -> None:

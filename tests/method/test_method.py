@@ -60,3 +60,7 @@ def test_a_method_or_a_policy_without_its_parts_cannot_be_made() -> None:
         Method(None, None, None)  # type: ignore[abstract, arg-type]
     with pytest.raises(TypeError, match="abstract"):
         Policy()  # type: ignore[abstract]
+
+
+def test_a_method_has_one_label_whatever_its_settings(method: Method[Config]) -> None:
+    assert method.label_of(method.config) == method.label

@@ -95,6 +95,14 @@ def test_the_paper_trains_both_phases_jointly(push: Task, name: str) -> None:
     assert resolve(load_method(name), push.name, "paper").method.design_credit == "joint"
 
 
+@pytest.mark.parametrize(
+    ("profile", "label"), [("paper", "GNN-PPO, joint credit"), ("laptop", "GNN-PPO, separate credit")]
+)
+def test_figures_tell_the_papers_method_from_our_variant_of_it(profile: str, label: str) -> None:
+    method_class = load_method("gnn_ppo")
+    assert method_class.label_of(resolve(method_class, "push", profile).method) == label
+
+
 @pytest.mark.parametrize("profile", profiles())
 @pytest.mark.parametrize("name", ["shared_arch", "hwasp_minimal", "cma_rl"])
 def test_baselines_share_the_settings_of_the_papers_method_unless_told(name: str, profile: str) -> None:

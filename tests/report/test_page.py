@@ -47,6 +47,13 @@ def test_a_folder_in_which_nothing_is_finished_still_gives_a_page(tmp_path: Path
     assert "line 1\nline 2" in text
 
 
+def test_the_page_tells_how_cells_were_made_otherwise(tmp_path: Path) -> None:
+    for seed, commit in enumerate(("a" * 40, "b" * 40)):
+        make_cell(tmp_path / "runs", seed, code={"commit": commit, "fingerprint": commit})
+    text = Reader(report(tmp_path / "runs")).text
+    assert "commits: aaaaaaaaaaaa (1 cell), bbbbbbbbbbbb (1 cell)" in text
+
+
 def test_backticks_become_code_and_the_rest_stays_text() -> None:
     assert code_spans("the figure `a<b` & more") == "the figure <code>a&lt;b</code> &amp; more"
     assert code_spans("one ` alone <b>") == "one ` alone &lt;b&gt;"

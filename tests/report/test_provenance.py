@@ -1,17 +1,12 @@
-"""How results were made: settings with their sources, versions, and the commit of the code."""
+"""How results were made: settings with their sources, code, machines and versions."""
 
 from __future__ import annotations
 
-import shutil
-import subprocess
 from pathlib import Path
 
-import pytest
-
-import codesign_bench
 from codesign_bench.config.settings import Sourced
 from codesign_bench.report.cells import read_cells
-from codesign_bench.report.provenance import code_version, configurations, version_table
+from codesign_bench.report.provenance import code_table, configurations, machine_table, version_table
 from reports import config, make_cell
 
 
@@ -19,7 +14,8 @@ def test_settings_that_differ_between_cells_get_a_line_for_each_value(tmp_path: 
     make_cell(tmp_path, 0)
     make_cell(tmp_path, 1)
     tuned = config(8, "tuned", clip=Sourced(0.2, "default"))
-    make_cell(tmp_path, 0, task="weave", config=tuned, versions={"python": "3.11.7"})
+    make_cell(tmp_path, 0, task="weave", config=tuned, versions={"python": "3.11.7", "torch": None})
+    make_cell(tmp_path, 1, task="weave", config=tuned, versions={"python": "3.11.7"})
     cells, _ = read_cells(tmp_path)
     (configuration,) = configurations(cells)
     assert list(configuration.table.rows) == [
@@ -28,8 +24,10 @@ def test_settings_that_differ_between_cells_get_a_line_for_each_value(tmp_path: 
         ("epochs", "8", "tuned", "weave"),
         ("clip", "0.2", "default", "weave"),
     ]
-    assert ("torch", "not installed", "weave") in version_table(cells).rows
-    assert ("task weave", "1", "weave") in version_table(cells).rows
+    rows = version_table(cells).rows
+    assert ("torch", "not installed", "weave/gnn_ppo/default/seed-00") in rows
+    assert ("torch", "not recorded", "weave/gnn_ppo/default/seed-01") in rows
+    assert any(row[:2] == ("task weave", "1") for row in rows)
 
 
 def test_cells_that_nothing_but_their_seed_tells_apart_are_named(tmp_path: Path) -> None:
@@ -43,23 +41,18 @@ def test_cells_that_nothing_but_their_seed_tells_apart_are_named(tmp_path: Path)
     ]
 
 
-def git(folder: Path, *arguments: str) -> None:
-    """Run git in `folder` as somebody."""
-    somebody = ("-c", "user.name=a", "-c", "user.email=a@example.com")
-    subprocess.run(["git", *somebody, *arguments], cwd=folder, check=True, capture_output=True)
+def test_commits_are_told_with_their_cells(tmp_path: Path) -> None:
+    told = {"version": "0.2.0", "commit": "a" * 40, "changed": False, "fingerprint": "1" * 64}
+    make_cell(tmp_path, 0, code=told, versions={"codesign_bench": "0.2.0"})
+    make_cell(tmp_path, 0, task="weave", versions={"codesign_bench": "0.1.0"})
+    assert list(code_table(read_cells(tmp_path)[0]).rows) == [
+        ("0.2.0", "aaaaaaaaaaaa", "reach"),
+        ("0.1.0", "not recorded", "weave"),
+    ]
 
 
-@pytest.mark.skipif(shutil.which("git") is None, reason="needs git")
-def test_the_commit_is_told_where_the_code_is_a_checkout_and_nowhere_else(tmp_path: Path) -> None:
-    package = tmp_path / "package"
-    package.mkdir()
-    (package / "__init__.py").write_text("")
-    version = f"codesign-bench {codesign_bench.__version__}"
-    git(tmp_path, "init")
-    assert code_version(package) == version  # another project's checkout, with the package in its environment
-    git(tmp_path, "add", ".")
-    git(tmp_path, "commit", "--message", "one")
-    assert code_version(package).startswith(f"{version}, commit ")
-    assert "uncommitted changes" not in code_version(package)
-    (package / "__init__.py").write_text("changed = True\n")
-    assert code_version(package).endswith("uncommitted changes")
+def test_a_machine_is_told_with_its_instruction_sets(tmp_path: Path) -> None:
+    make_cell(tmp_path, 0, host={"name": "desk", "cpu": "some CPU", "instruction_sets": ["avx2"], "threads": 1})
+    ((*told, count),) = machine_table(read_cells(tmp_path)[0]).rows
+    assert "some CPU (avx2)" in told
+    assert count == "1"

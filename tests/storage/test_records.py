@@ -53,7 +53,9 @@ def test_a_record_is_read_as_it_was_written(tmp_path: Path) -> None:
         env_steps=12,
         config=BUDGET,
         versions={"torch": "2.13.0", "pybullet": None},
+        code={"version": "0.2.0", "commit": None, "changed": None, "fingerprint": "1f"},
         host={"threads": 3},
+        earlier=({"code": {}, "versions": {}, "host": {"cpu": "some CPU"}},),
         pid=5,
         timings=Timings(started="2026-01-01T00:00:00+00:00", wall_s=2.5),
         failure=Failure("it broke", "Traceback"),
@@ -76,6 +78,8 @@ def test_a_record_of_version_0_1_0_is_read_with_the_axes_that_it_had() -> None:
         1.5,
         Failure("it broke", "Traceback\nValueError: it broke"),
     )
+    assert (record.code, record.earlier) == ({}, ())
+    assert record.conditions == {"code": {}, "versions": VERSION_0_1_0["versions"], "host": VERSION_0_1_0["host"]}
     older = CellRecord.from_json({**VERSION_0_1_0, "finetune": 2, "alpha": None, "label": ""})
     assert older.variant == Variant.of(finetune=2)
     assert older.label == "gnn_ppo"
@@ -92,6 +96,8 @@ def test_a_record_of_version_0_1_0_is_read_with_the_axes_that_it_had() -> None:
         ({"task": 5}, "'task' is not text"),
         ({"timings": {"yesterday": 1}}, "yesterday"),
         ({"alpha": True}, "axis 'alpha' is a bool"),
+        ({"code": "main"}, "'str' object has no attribute 'items'"),
+        ({"earlier": ["once"]}, "'str' object has no attribute 'items'"),
         ({"failure": "it broke"}, "string indices"),
     ],
 )
@@ -123,3 +129,17 @@ def test_an_ended_record_keeps_its_start(tmp_path: Path) -> None:
 )
 def test_the_last_line_of_a_failure(failure: Failure, line: str) -> None:
     assert failure.last_line == line
+
+
+@pytest.mark.parametrize(
+    ("method", "label"),
+    [
+        ({"design_credit": {"value": "separate", "source": "default"}}, "GNN-PPO, separate credit"),
+        ({"design_credit": {"value": "joint", "source": "--set"}}, "GNN-PPO, joint credit"),
+        ({}, "GNN-PPO"),
+    ],
+)
+def test_a_former_label_gets_the_credit_of_the_design_step(method: dict[str, Any], label: str) -> None:
+    config = {**VERSION_0_1_0["config"], "method": method}
+    assert CellRecord.from_json({**VERSION_0_1_0, "label": "GNN-PPO (paper's)", "config": config}).label == label
+    assert CellRecord.from_json({**VERSION_0_1_0, "config": config}).label == "GNN-PPO"

@@ -64,7 +64,7 @@ def test_frames_have_every_axis_as_a_column() -> None:
         assert rows_varying(frame, "alpha")["alpha"].unique().tolist() == [0.125]
         assert rows_varying(frame, "cutout")["variant"].unique().tolist() == ["cutout-0.40"]
         assert rows_varying(frame, "finetune")["finetune"].unique().tolist() == [1.0]
-        assert set(frame["label"]) >= {"GNN-PPO (paper's)", "CMA-RL", "CMA-ES"}
+        assert set(frame["label"]) >= {"GNN-PPO, separate credit", "CMA-RL", "CMA-ES"}
 
 
 @pytest.mark.numeric

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from builders import sweep
 from codesign_bench import load_results
-from codesign_bench.cell.cell import Cell
+from codesign_bench.cell.cell import Cell, resolve_cell
+from codesign_bench.code_version import code_version
+from codesign_bench.machine import host_facts, package_versions
 from codesign_bench.storage.records import CellRecord
+from codesign_bench.sweep.cell_process import describe
 
 pytestmark = pytest.mark.usefixtures("toy")
 
@@ -40,11 +44,24 @@ def test_a_finished_cell_holds_curve_configuration_versions_and_policy(tmp_path:
     assert record.config.run["steps"] == (200, "--steps")
     assert record.config.method["step_size"] == (0.3, "toy paper, table 1")
     assert record.env_steps == steps[-1]
-    assert {"python", "numpy", "torch", "pymunk", "cma", "gymnasium", "codesign_bench"} <= set(record.versions)
+    assert dict(record.versions) == package_versions()
+    assert record.code == code_version().to_json()
+    assert record.host == host_facts(threads=1)
+    assert record.earlier == ()
     assert str(record.timings.ended) >= str(record.timings.started)
     assert record.threads == 1
     left = {path.name for path in CELL.folder(tmp_path).iterdir()}
     assert left == {"cell.json", "curve.csv", "metrics.csv", "evaluation.csv", "policy.safetensors"}
+
+
+def test_a_cell_that_is_resumed_under_other_code_keeps_what_it_began_with() -> None:
+    resolved = resolve_cell(CELL)
+    before = replace(describe(resolved, None), code={"fingerprint": "1f"})
+    assert describe(resolved, None).earlier == ()
+    resumed = describe(resolved, before)
+    assert resumed.earlier == (before.conditions,)
+    assert describe(resolved, resumed).earlier == resumed.earlier
+    assert describe(resolved, describe(resolved, None)).earlier == ()
 
 
 def test_the_cell_file_is_plain_json(tmp_path: Path) -> None:

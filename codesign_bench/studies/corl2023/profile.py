@@ -22,6 +22,7 @@ from codesign_bench.studies.corl2023.protocol import PROTOCOL
 
 BASELINE_TABLE = "paper, table of baseline hyperparameters"
 TRANSFORM2ACT = "Transform2Act's default; the paper is silent"
+TRANSFORM2ACT_TASKS = "Transform2Act's hopper and gap configurations; the paper is silent"
 
 
 def optimizer(task_name: str) -> Settings:
@@ -42,6 +43,7 @@ def optimizer(task_name: str) -> Settings:
     return {
         **sourced(rows, _source(task_name)),
         **sourced({"design_credit": "joint"}, "paper, section 'Policy learning': both phases train jointly"),
+        **sourced({"batch_design": True}, TRANSFORM2ACT_TASKS),
         **sourced({"normalize_returns": False, "final_learning_rate_fraction": 1.0}, TRANSFORM2ACT),
     }
 

@@ -160,3 +160,9 @@ BOX_SCENES: dict[str, BoxSceneTable] = {
 
 
 SCENES: dict[str, SceneTable] = {**PLANAR_SCENES, **BOX_SCENES}
+
+UNUSED: dict[str, str] = dict.fromkeys(
+    (f"{name}: tool_angle_init" for name in PLANAR_SCENES),
+    "no task uses it: all its entries are zero, and angle = scale * ratio",
+)
+"""Rows, as "task: row", for which no constant of the task stands, and why."""

@@ -27,6 +27,8 @@ def test_the_papers_own_method_has_every_row_of_its_table(task_name: str) -> Non
         assert getattr(config.method, field.name) == getattr(LEARNERS[task_name], field.name)
         assert config.sources[f"method.{field.name}"] == f"paper, table of {task_name}"
     assert (config.run.steps, config.method.design_credit) == (10_000_000, "joint")
+    assert config.method.batch_design
+    assert config.sources["method.batch_design"].startswith("Transform2Act's hopper and gap configurations")
 
 
 def test_a_task_that_the_paper_does_not_have_gets_the_settings_of_push() -> None:

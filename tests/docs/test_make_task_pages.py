@@ -85,3 +85,11 @@ def test_the_meaning_of_a_constant_is_the_docstring_behind_it(script: Any) -> No
 )
 def test_numbers_are_written_as_people_read_them(script: Any, value: Any, unit: str, text: str) -> None:
     assert script.number(value, unit) == text
+
+
+def test_a_long_series_of_an_observation_has_one_row(script: Any) -> None:
+    rows = list(script._observation(load_task("scoop")))
+    entries = [row[1] for row in rows]
+    assert ("21 to 44", "`surface_1` to `surface_24`") in [row[:2] for row in rows]
+    assert "`wants_1`" in entries, "a short series is written out"
+    assert rows[-1][0].endswith(f" to {load_task('scoop').layout.size - 1}")

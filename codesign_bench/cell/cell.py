@@ -12,6 +12,7 @@ from codesign_bench.cell.axes import axis_named
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.config.resolve import ResolvedConfig, check_overrides, resolve
+from codesign_bench.config.run_settings import VALIDATION
 from codesign_bench.method import Method, Problem, load_method
 from codesign_bench.task import Task, load_task
 
@@ -71,7 +72,7 @@ class ResolvedCell:
 
     def problem(self) -> Problem:
         """Return what its method is asked to learn."""
-        problem = Problem(self.task)
+        problem = Problem(self.task, validation=self.config.run.instances == VALIDATION)
         for axis, value in self.cell.variant:
             problem = axis_named(axis).problem(problem, value, self.config.run)
         return problem

@@ -14,6 +14,7 @@ from codesign_bench.config.profiles import Profile
 from codesign_bench.errors import unknown_name
 from codesign_bench.registry import load_attribute, names
 from codesign_bench.study.experiment import Experiment
+from codesign_bench.study.tuning import Tuning
 
 if TYPE_CHECKING:  # claims need pandas and scipy, which listing a study does not
     from codesign_bench.claims.claim import Claim
@@ -49,6 +50,8 @@ class Study:
     """Profiles that it adds."""
     axes: tuple[Axis, ...] = ()
     """Axes that its cells vary beyond the built-in ones."""
+    tuning: Tuning | None = None
+    """How settings of its methods are searched; None: they are not."""
 
     @property
     def figures(self) -> tuple[str, ...]:

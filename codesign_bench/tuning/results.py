@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +84,7 @@ def winners(tuning: Tuning, scores: Sequence[Score]) -> list[Score]:
     for found in last:
         groups.setdefault((found.setting.task, found.setting.method), []).append(found)
     chosen = [best(group, 1)[0] for group in groups.values()]
-    return [winner for winner in chosen if not isnan(winner.validation_return)]
+    return [winner for winner in chosen if not winner.failed]
 
 
 def read_winners(path: Path) -> dict[tuple[str, str], tuple[str, ...]]:

@@ -26,6 +26,11 @@ class Score:
     validation_return: float
     """NaN if one of its cells failed."""
 
+    @property
+    def failed(self) -> bool:
+        """Whether one of its cells failed; the setting then goes no further."""
+        return isnan(self.validation_return)
+
 
 def score(setting: Setting, rung: int, cells: Sequence[Cell], out: Path) -> Score:
     """Return the score of a setting from its cells in the results folder `out`; all of them have ended."""
@@ -52,7 +57,6 @@ def best(scores: Sequence[Score], count: int) -> list[Score]:
     """Return the `count` best scores, best first; of equal ones the setting drawn first, and those with NaN last."""
 
     def place(found: Score) -> tuple[bool, float, int]:
-        failed = isnan(found.validation_return)
-        return failed, 0.0 if failed else -found.validation_return, found.setting.number
+        return found.failed, 0.0 if found.failed else -found.validation_return, found.setting.number
 
     return sorted(scores, key=place)[:count]

@@ -105,7 +105,7 @@ def tune(
         following = tuning.sizes[rung + 1] if rung + 1 < tuning.rungs else 1
         for group, settings in alive.items():
             found = [score(setting, rung, cells[(*group, setting.number)], out) for setting in settings]
-            going_on = best(found, following)
+            going_on = [kept_score for kept_score in best(found, following) if not kept_score.failed]
             scores += found
             kept += going_on
             alive[group] = in_order(going_on)
@@ -122,13 +122,17 @@ def in_order(scores: list[Score]) -> list[Setting]:
 
 def conclude(log: Log, out: Path, profile: str, chosen: list[Score], scores: list[Score]) -> None:
     """Print the best settings, what the search took, and how to train with them."""
+    for method, env_steps in spent(scores).items():
+        log(f"tuning of {method} took {env_steps:,} environment steps")
+    log(f"wrote {out / TABLE_FILE} and {out / WINNERS_FILE}")
+    if not chosen:
+        log("every setting failed")
+        return
     for winner in chosen:
         setting = winner.setting
         log(f"{setting.task} {setting.method}: setting {setting.number}, return {winner.validation_return:.2f}")
         log(f"  --set {' '.join(setting.overrides)}")
-    for method, env_steps in spent(scores).items():
-        log(f"tuning of {method} took {env_steps:,} environment steps")
-    log(f"wrote {out / TABLE_FILE} and {out / WINNERS_FILE}; train on seeds that tuning did not use, for example")
+    log("train with them on seeds that tuning did not use, for example:")
     log(
         f"codesign-bench run --method {' '.join(dict.fromkeys(found.setting.method for found in chosen))} "
         f"--task {' '.join(dict.fromkeys(found.setting.task for found in chosen))} --profile {profile} "

@@ -68,7 +68,7 @@ def test_every_axis_of_a_variant_changes_the_problem() -> None:
         ({"method": "guess"}, "unknown method 'guess'"),
         ({"profile": "weekend"}, "unknown profile 'weekend'"),
         ({"overrides": ("speed=1",)}, "--set speed=1: unknown key 'speed'"),
-        ({"overrides": ("gnn_ppo.epochs=1",)}, "'gnn_ppo' is none of the selected methods"),
+        ({"overrides": ("gnn_ppo.epochs=1",)}, "'gnn_ppo' is not a selected method"),
         ({"variant": Variant.of(alpha=2.0)}, "--alpha must be between 0 and 1, not 2"),
     ],
 )

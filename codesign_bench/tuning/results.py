@@ -12,7 +12,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.storage.files import write_json
 from codesign_bench.storage.layout import write_rows
 from codesign_bench.study.tuning import Tuning
-from codesign_bench.tuning.scores import Score, best
+from codesign_bench.tuning.scores import Score
 
 TABLE_FILE, WINNERS_FILE = "tuning.csv", "tuned.json"
 COLUMNS = ("task", "method", "setting", "rung", "steps", "seeds", "env_steps", "validation_return", "kept")
@@ -47,16 +47,18 @@ def spent(scores: Sequence[Score]) -> dict[str, int]:
     return steps
 
 
-def write_winners(out: Path, header: Mapping[str, Any], tuning: Tuning, scores: Sequence[Score]) -> list[Score]:
-    """Write the best setting of every method on every task, for `run --tuned`, and return their scores.
+def write_winners(
+    out: Path, header: Mapping[str, Any], tuning: Tuning, scores: Sequence[Score], winners: Sequence[Score]
+) -> None:
+    """Write the best setting of every method on every task, for `run --tuned`.
 
     Args:
         out: the results folder.
         header: what the file says of the search besides its size.
         tuning: the search.
-        scores: of all rungs.
+        scores: of all rungs, for the steps that the search took.
+        winners: the best scores of the last rung.
     """
-    found = winners(tuning, scores)
     content = {
         **header,
         "tuning": asdict(tuning),
@@ -70,21 +72,10 @@ def write_winners(out: Path, header: Mapping[str, Any], tuning: Tuning, scores: 
                 "values": dict(winner.setting.values),
                 "set": list(winner.setting.overrides),
             }
-            for winner in found
+            for winner in winners
         ],
     }
     write_json(out / WINNERS_FILE, content)
-    return found
-
-
-def winners(tuning: Tuning, scores: Sequence[Score]) -> list[Score]:
-    """Return the best score of the last rung for every task and method; without those where every setting failed."""
-    last = [found for found in scores if found.rung == tuning.rungs - 1]
-    groups: dict[tuple[str, str], list[Score]] = {}
-    for found in last:
-        groups.setdefault((found.setting.task, found.setting.method), []).append(found)
-    chosen = [best(group, 1)[0] for group in groups.values()]
-    return [winner for winner in chosen if not winner.failed]
 
 
 def read_winners(path: Path) -> dict[tuple[str, str], tuple[str, ...]]:

@@ -60,3 +60,12 @@ def best(scores: Sequence[Score], count: int) -> list[Score]:
         return found.failed, 0.0 if found.failed else -found.validation_return, found.setting.number
 
     return sorted(scores, key=place)[:count]
+
+
+def survivors(scores: Sequence[Score], count: int) -> list[Score]:
+    """Return the `count` best scores of every method on every task, in the given order; failed ones are left out."""
+    groups: dict[tuple[str, str], list[Score]] = {}
+    for found in scores:
+        groups.setdefault((found.setting.task, found.setting.method), []).append(found)
+    chosen = {id(found) for group in groups.values() for found in best(group, count)}
+    return [found for found in scores if id(found) in chosen and not found.failed]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -16,8 +17,8 @@ from codesign_bench.study.study import Study
 from codesign_bench.study.tuning import FIRST_REPORTED_SEED, Tuning
 from codesign_bench.sweep.runner import EXIT_ALL_DONE, run_sweep
 from codesign_bench.tuning.results import TABLE_FILE, WINNERS_FILE, spent, write_table, write_winners
-from codesign_bench.tuning.scores import Score, best, score
-from codesign_bench.tuning.settings import Setting, cells_in_turn, settings_of
+from codesign_bench.tuning.scores import Score, score, survivors
+from codesign_bench.tuning.settings import cells_in_turn, settings_of
 
 
 def tuning_of(study: Study) -> Tuning:
@@ -76,48 +77,36 @@ def tune(
         KeyboardInterrupt: the user stopped the search.
     """
     tuning, log, code = tuning_of(study), printer(console), EXIT_ALL_DONE
-    groups = list(product(tuning.tasks, tuning.methods))
     budgets = {task: budgets_of(tuning, task, profile, steps) for task in tuning.tasks}
-    alive = {(task, method): settings_of(tuning, task, method, profile) for task, method in groups}
-    scores, kept = list[Score](), list[Score]()
+    sweep = partial(
+        run_sweep,
+        out=out,
+        console=console,
+        jobs=jobs,
+        retry_failed=retry_failed,
+        backend=backend,
+        scheduler=scheduler,
+    )
+    alive = [
+        setting
+        for task, method in product(tuning.tasks, tuning.methods)
+        for setting in settings_of(tuning, task, method, profile)
+    ]
+    scores, kept, winners = list[Score](), list[Score](), list[Score]()
     print_plan(console, tuning, profile, steps)
-    for rung in range(tuning.rungs):
-        cells = {
-            (setting.task, setting.method, setting.number): setting.cells(
-                tuning, rung, profile, budgets[setting.task][rung]
-            )
-            for group in alive.values()
-            for setting in group
-        }
-        log(f"rung {rung + 1} of {tuning.rungs}: {tuning.sizes[rung]} settings of every method on every task")
-        code = max(
-            code,
-            run_sweep(
-                resolve_cells(cells_in_turn(cells.values())),
-                out,
-                console=console,
-                jobs=jobs,
-                retry_failed=retry_failed,
-                backend=backend,
-                scheduler=scheduler,
-            ),
-        )
-        following = tuning.sizes[rung + 1] if rung + 1 < tuning.rungs else 1
-        for group, settings in alive.items():
-            found = [score(setting, rung, cells[(*group, setting.number)], out) for setting in settings]
-            going_on = [kept_score for kept_score in best(found, following) if not kept_score.failed]
-            scores += found
-            kept += going_on
-            alive[group] = in_order(going_on)
+    for rung, following in enumerate([*tuning.sizes[1:], 1]):
+        log(f"rung {rung + 1} of {tuning.rungs}")
+        cells = [setting.cells(tuning, rung, profile, budgets[setting.task][rung]) for setting in alive]
+        code = max(code, sweep(resolve_cells(cells_in_turn(cells))))
+        found = [score(setting, rung, part, out) for setting, part in zip(alive, cells, strict=True)]
+        winners = survivors(found, following)
+        alive = [winner.setting for winner in winners]
+        scores += found
+        kept += winners
         write_table(out, tuning, scores, kept)
-    header = {"study": study.name, "profile": profile}
-    conclude(log, out, profile, write_winners(out, header, tuning, scores), scores)
+    write_winners(out, {"study": study.name, "profile": profile}, tuning, scores, winners)
+    conclude(log, out, profile, winners, scores)
     return code
-
-
-def in_order(scores: list[Score]) -> list[Setting]:
-    """Return the settings of scores in the order in which they were drawn."""
-    return sorted((found.setting for found in scores), key=lambda setting: setting.number)
 
 
 def conclude(log: Log, out: Path, profile: str, chosen: list[Score], scores: list[Score]) -> None:

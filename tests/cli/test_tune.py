@@ -19,9 +19,9 @@ def test_the_plan_is_printed_and_nothing_runs(
     monkeypatch.chdir(tmp_path)
     assert main([*TUNE, "--steps", "300", "--plan"]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
-    assert ["toy_reach", "0", "3", "100", "600"] in lines
-    assert ["toy_reach", "1", "1", "300", "600"] in lines
-    assert "the same for toy_aim, toy_search: 1,200 steps each, 2,400 in all" in " ".join(lines[-1])
+    assert ["toy_reach", "0", "3", "100", "300"] in lines
+    assert ["toy_reach", "1", "1", "300", "300"] in lines
+    assert "the same for toy_aim, toy_search: 600 steps each, 1,200 in all" in " ".join(lines[-1])
     assert list(tmp_path.iterdir()) == []
 
 

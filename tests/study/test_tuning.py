@@ -6,8 +6,10 @@ from typing import Any
 
 import pytest
 
+from codesign_bench.registry import names
 from codesign_bench.study import DEFAULT_STUDY, FIRST_REPORTED_SEED, Tuning, load_study, study_names
 from codesign_bench.study.tuning import TUNING_SEEDS
+from codesign_bench.tuning.settings import settings_of
 
 
 def tuning(**changes: Any) -> Tuning:
@@ -52,6 +54,9 @@ def test_a_study_searches_the_settings_of_all_of_its_methods(name: str) -> None:
     if study.tuning is None:
         pytest.skip("does without")
     assert set(study.methods) <= set(study.tuning.methods)
+    assert set(study.tuning.tasks) <= set(names("tasks"))
+    for method in study.tuning.methods:
+        assert settings_of(study.tuning, study.tuning.tasks[0], method, "laptop")
 
 
 @pytest.mark.parametrize("name", study_names())

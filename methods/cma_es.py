@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from codesign_bench.config.search import Integer
 from codesign_bench.config.settings import Settings
 from codesign_bench.config.validation import check_range
 from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, fitness_metrics
@@ -30,7 +31,9 @@ PLAN = "plan"
 class Config(EvolutionConfig):
     """Hyperparameters of `cma_es`."""
 
-    episodes_per_candidate: int = field(default=4, metadata={"source": "ours; the paper is silent"})
+    episodes_per_candidate: int = field(
+        default=4, metadata={"source": "ours; the paper is silent", "search": Integer(1, 32, log=True)}
+    )
     """Number of instances over which a candidate's return is averaged, the same for all candidates of a generation."""
 
     def __post_init__(self) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -37,6 +37,9 @@ from ._settings import SMALL_PERCEPTRONS, SMALL_PPO, Tuned, ppo_settings, tuned
 @dataclass(frozen=True, kw_only=True)
 class Config(EvolutionConfig, PerceptronConfig):
     """Hyperparameters of `cma_rl`: CMA-ES's for the design, PPO's and the perceptrons' for the controller."""
+
+    not_searched: ClassVar = ("design_log_std", "design_learning_rate", "design_epochs", "design_kl_threshold")
+    """Without effect here: CMA-ES moves the design."""
 
     def __post_init__(self) -> None:
         EvolutionConfig.__post_init__(self)

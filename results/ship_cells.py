@@ -13,7 +13,7 @@ from pathlib import Path
 
 from codesign_bench.cell.variant import DEFAULT
 from codesign_bench.errors import UserError
-from codesign_bench.storage.cells import find_cells
+from codesign_bench.storage.cells import reported_cells
 from codesign_bench.storage.layout import CURVE_FILE, EVALUATION_FILE, METRICS_FILE, POLICY_FILE, open_folder
 from codesign_bench.storage.records import CELL_FILE, CellRecord
 from codesign_bench.studies.corl2023.members import OURS
@@ -36,7 +36,7 @@ def ship(runs: Path, shipped: Path, all_policies: bool = False) -> list[Path]:
         UserError: `runs` is no results folder, or `shipped` cannot be one.
     """
     copied = []
-    cells = [cell for cell in find_cells(runs) if cell.is_done]
+    cells = [cell for cell in reported_cells(runs) if cell.is_done]
     open_folder(shipped)
     for cell in cells:
         target = shipped / cell.folder.relative_to(runs)

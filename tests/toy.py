@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from codesign_bench.config.search import Integer, LogUniform
 from codesign_bench.method import Array, BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Booleans, Box, Floats, Simulator, Singles, Slots, Task, ToolGraph
@@ -117,8 +118,8 @@ def _gate() -> float:
 class Config:
     """Options of the search."""
 
-    episodes: int = 4
-    step_size: float = field(default=0.3, metadata={"source": "toy paper, table 1"})
+    episodes: int = field(default=4, metadata={"search": Integer(2, 8)})
+    step_size: float = field(default=0.3, metadata={"source": "toy paper, table 1", "search": LogUniform(0.01, 1.0)})
     widths: tuple[int, ...] = (8, 8)
     decay: float | None = None
     greedy: bool = True

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from codesign_bench.cell.variant import Value, Variant
-from codesign_bench.config.run_settings import RunSettings
+from codesign_bench.config.run_settings import VALIDATION, RunSettings
 from codesign_bench.config.values import parse_value
 from codesign_bench.errors import UserError, unknown_name
 from codesign_bench.method import Problem
@@ -131,7 +131,40 @@ class Scratch(_OneInstance):
     help = "train from scratch on fine-tuning instance N"
 
 
+class _OfTuning(Axis):
+    """Numbers the cells of a search for settings; these are evaluated on validation instances, at start and end."""
+
+    kind = int
+    metavar = "N"
+
+    def check(self, value: Value, task: Task) -> None:
+        """Refuse negative numbers."""
+        if int(value) < 0:
+            raise UserError(f"--variant {self.name}={value}: must not be negative")
+
+    def overrides(self, value: Value) -> tuple[str, ...]:
+        """Keep the cell from being reported, and evaluate it no more often than the search needs."""
+        return (f"run.instances={VALIDATION}", "run.evaluations=1")
+
+
+class Rung(_OfTuning):
+    """A rung of successive halving: cells of later rungs are fewer and longer."""
+
+    name = "rung"
+    help = "rung N of a search for settings"
+
+
+class Setting(_OfTuning):
+    """One random setting of all searched hyperparameters."""
+
+    name = "setting"
+    help = "number N of the settings that a search draws"
+
+
 BUILT_IN: Mapping[str, Axis] = {axis.name: axis for axis in (Cutout(), Alpha(), Finetune(), Scratch())}
+"""Axes with an option of `run`."""
+OF_TUNING: Mapping[str, Axis] = {axis.name: axis for axis in (Rung(), Setting())}
+"""Axes of the cells of `tune`."""
 
 
 def axis_named(name: str) -> Axis:
@@ -140,8 +173,8 @@ def axis_named(name: str) -> Axis:
     Raises:
         UserError: an unknown axis.
     """
-    if name in BUILT_IN:  # without importing a study
-        return BUILT_IN[name]
+    if name in (own := {**BUILT_IN, **OF_TUNING}):  # without importing any study
+        return own[name]
     known = axes()
     if name not in known:
         raise unknown_name("axis", name, known)
@@ -151,7 +184,7 @@ def axis_named(name: str) -> Axis:
 def axes() -> dict[str, Axis]:
     """Return all axes by name: the built-in ones, then those of every study."""
     added = (axis for study in names("studies") for axis in load_attribute("studies", study, "STUDY").axes)
-    return {**BUILT_IN, **{axis.name: axis for axis in added}}
+    return {**BUILT_IN, **OF_TUNING, **{axis.name: axis for axis in added}}
 
 
 def parse_axis_value(name: str, text: str) -> Value:

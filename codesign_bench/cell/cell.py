@@ -12,6 +12,7 @@ from codesign_bench.cell.axes import axis_named
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.config.resolve import ResolvedConfig, check_overrides, differences, resolve
+from codesign_bench.config.run_settings import VALIDATION
 from codesign_bench.config.settings import StoredConfig
 from codesign_bench.method import Method, Problem, load_method
 from codesign_bench.task import Task, load_task
@@ -79,7 +80,7 @@ class ResolvedCell:
 
     def problem(self) -> Problem:
         """Return the learning problem of its method."""
-        problem = Problem(self.task)
+        problem = Problem(self.task, validation=self.config.run.instances == VALIDATION)
         for axis, value in self.cell.variant:
             problem = axis_named(axis).problem(problem, value, self.config.run)
         return problem

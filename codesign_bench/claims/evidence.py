@@ -20,7 +20,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.evaluation.extrapolation import load_outside
 from codesign_bench.evaluation.sensitivity import load_sensitivity
 from codesign_bench.stats import CELL_KEYS, MIN_SEEDS
-from codesign_bench.storage.cells import find_cells
+from codesign_bench.storage.cells import reported_cells
 from codesign_bench.storage.frames import load_evaluations, load_results
 from codesign_bench.task import load_task, task_names
 
@@ -110,7 +110,7 @@ def load_evidence(results: Path) -> Evidence:
     Raises:
         UserError: the folder does not exist, or has neither a finished cell nor a design-sensitivity table.
     """
-    profiles = {cell.record.profile for cell in find_cells(results)}
+    profiles = {cell.record.profile for cell in reported_cells(results)}
     curves = _read(load_results, results, ("return_mean", "success_rate"))
     evaluations = _read(load_evaluations, results, ("return", "success", "material", "effort"))
     sensitivity = _read(load_sensitivity, results, ("tool", "goal", "success"))

@@ -58,6 +58,17 @@ def add_jobs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--jobs", type=integer, metavar="N", help="cells that run at a time; default: one per core")
 
 
+def add_sweep(parser: argparse.ArgumentParser) -> None:
+    """Add where cells run, and whether those that failed run again."""
+    parser.add_argument(
+        "--backend", default="loky", choices=("loky", "dask"), help="loky (default): this machine; dask: a cluster"
+    )
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="address of a running Dask scheduler (default: start a local cluster)"
+    )
+    parser.add_argument("--retry-failed", action="store_true", help="run failed cells again")
+
+
 def add_config(parser: argparse.ArgumentParser) -> None:
     """Add what determines a cell's configuration: profile, budget and individual settings."""
     add_profile(parser)

@@ -20,6 +20,7 @@ COMMANDS = (
     "list",
     "show",
     "run",
+    "tune",
     "status",
     "plot",
     "verify",

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import argparse
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
@@ -15,6 +18,7 @@ from codesign_bench.cli.arguments import (
     add_config,
     add_jobs,
     add_out,
+    add_sweep,
     check_at_least_one,
     chosen_methods,
     chosen_tasks,
@@ -22,6 +26,9 @@ from codesign_bench.cli.arguments import (
 )
 from codesign_bench.config.run_settings import DEVICES, PRECISIONS
 from codesign_bench.errors import UserError
+
+if TYPE_CHECKING:
+    from codesign_bench.cell.cell import Cell
 
 HELP = "train and evaluate: method x task x variant x seed"
 VALUE_TYPES: Mapping[type, Callable[[str], Value]] = {float: float, int: integer, str: str}
@@ -36,6 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--task", required=True, nargs="+", metavar="T", help="names, or all")
     parser.add_argument("--seeds", default="1", help="a count (6 is 0-5), a list (0,3,5) or a range (2-4); default: 1")
     add_config(parser)
+    parser.add_argument(
+        "--tuned", type=Path, metavar="FILE", help="settings that `tune` found for each task and method (tuned.json)"
+    )
     for axis in BUILT_IN.values():
         parser.add_argument(
             f"--{axis.name}", nargs="+", type=VALUE_TYPES[axis.kind], default=[], metavar=axis.metavar, help=axis.help
@@ -54,13 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--precision", choices=PRECISIONS, help="auto: bfloat16 updates if the processor supports them; default: fp32"
     )
     add_out(parser, DEFAULT_RESULTS)
-    parser.add_argument(
-        "--backend", default="loky", choices=("loky", "dask"), help="loky (default): this machine; dask: a cluster"
-    )
-    parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="address of a running Dask scheduler (default: start a local cluster)"
-    )
-    parser.add_argument("--retry-failed", action="store_true", help="run failed cells again")
+    add_sweep(parser)
 
 
 # Modules that import pandas or torch are imported inside functions, so that `list` and `--help` need neither.
@@ -82,7 +86,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         steps=options.steps,
         overrides=overrides(options),
     )
-    resolved = resolve_cells(list(cells))
+    resolved = resolve_cells(list(cells) if options.tuned is None else tuned_cells(cells, options.tuned))
     for device in {cell.config.run.device for cell in resolved}:
         _check_device(device)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does
@@ -95,6 +99,22 @@ def run(options: argparse.Namespace, console: Console) -> int:
         backend=options.backend,
         scheduler=options.scheduler,
     )
+
+
+def tuned_cells(cells: Iterable[Cell], path: Path) -> list[Cell]:
+    """Return cells with the best settings that a search found for their task and method; `--set` overrides these.
+
+    Raises:
+        UserError: the file cannot be read, or the search was not of a cell's task and method.
+    """
+    from codesign_bench.tuning.results import read_winners
+
+    found, chosen = read_winners(path), []
+    for cell in cells:
+        if (cell.task, cell.method) not in found:
+            raise UserError(f"--tuned {path}: has no settings of '{cell.method}' on '{cell.task}'")
+        chosen.append(replace(cell, overrides=(*found[cell.task, cell.method], *cell.overrides)))
+    return chosen
 
 
 def axis_values(options: argparse.Namespace) -> dict[str, list[Value]]:

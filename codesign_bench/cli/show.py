@@ -8,7 +8,7 @@ from rich.console import Console
 
 from codesign_bench.cli.arguments import add_config, check_at_least_one
 
-HELP = "print the resolved configuration, every value with its source"
+HELP = "print the resolved configuration, every value with its source and its range in tuning"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,8 +19,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Print every value of a cell's configuration with its source."""
+    """Print every value of a cell's configuration with its source, and the range that `tune` searches."""
     from codesign_bench.cell.cell import Cell, resolve_cells
+    from codesign_bench.config.search import ranges
+    from codesign_bench.config.settings import METHOD
     from codesign_bench.console import print_table
 
     check_at_least_one(options, "steps")
@@ -33,11 +35,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
         overrides=tuple(options.overrides),
     )
     (resolved,) = resolve_cells([cell])
-    rows = [("task", "version", str(resolved.task.version), resolved.task.name)]
+    searched = {(METHOD, name): str(found) for name, found in ranges(resolved.config.method).items()}
+    rows = [("task", "version", str(resolved.task.version), resolved.task.name, "")]
     rows += [
-        (part, name, str(value), source)
+        (part, name, str(value), source, searched.get((part, name), ""))
         for part, settings in resolved.config.stored().parts.items()
         for name, (value, source) in settings.items()
     ]
-    print_table(console, ("part", "name", "value", "source"), rows)
+    print_table(console, ("part", "name", "value", "source", "searched"), rows)
     return 0

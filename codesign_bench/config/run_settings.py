@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 DEVICES = ("cpu", "cuda")
 PRECISIONS = ("fp32", "auto")
+EVALUATION, VALIDATION = "evaluation", "validation"
+"""Names of a task's two fixed sets of instances: for results that are reported, and for choosing settings."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +27,14 @@ class RunSettings:
     device: str = "cpu"
     """Device of network updates: cpu or cuda. Rollouts always run on the CPU. Floating-point results depend on it."""
 
+    instances: str = EVALUATION
+    """Instances of evaluations: evaluation, or validation for tuning. Results on the latter are never reported."""
+
     def __post_init__(self) -> None:
         if self.device not in DEVICES:
             raise ValueError(f"device must be one of {', '.join(DEVICES)}, not '{self.device}'")
+        if self.instances not in (EVALUATION, VALIDATION):
+            raise ValueError(f"instances must be {EVALUATION} or {VALIDATION}, not '{self.instances}'")
         for name in ("steps", "evaluations", "fine_tuning_steps", "threads"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")

@@ -19,7 +19,7 @@ from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.seeding import generator
-from codesign_bench.storage.cells import StoredCell, find_cells
+from codesign_bench.storage.cells import StoredCell, reported_cells
 from codesign_bench.storage.policies import policy_of
 from codesign_bench.storage.tables import read_table, write_table
 from codesign_bench.task import EVALUATION_SEED, Floats, Task, load_task
@@ -90,7 +90,7 @@ def load_outside(results: Path) -> pd.DataFrame:
     Raises:
         UserError: nothing is measured yet.
     """
-    varying_nothing = (cell.record for cell in find_cells(results) if cell.record.variant == DEFAULT)
+    varying_nothing = (cell.record for cell in reported_cells(results) if cell.record.variant == DEFAULT)
     pairs = list(dict.fromkeys((record.task, record.method) for record in varying_nothing))
     return load_or_measure(results, pairs, silent, measure_missing=False)
 
@@ -105,7 +105,7 @@ def _finished(results: Path, task: str, method: str, variant: Variant) -> dict[i
     wanted = (task, method, variant)
     return {
         cell.record.seed: cell
-        for cell in find_cells(results)
+        for cell in reported_cells(results)
         if (cell.record.task, cell.record.method, cell.record.variant) == wanted and cell.is_done and cell.has_policy
     }
 

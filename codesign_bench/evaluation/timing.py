@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from codesign_bench.cell.variant import DEFAULT
 from codesign_bench.errors import UserError
-from codesign_bench.storage.cells import StoredCell, find_cells
+from codesign_bench.storage.cells import StoredCell, reported_cells
 from codesign_bench.storage.policies import misfit, policy_of
 from codesign_bench.task import load_task
 from codesign_bench.task.episodes import Episodes
@@ -39,7 +39,7 @@ def timing_frame(results: Path) -> pd.DataFrame:
 
     rows = []
     timed: set[tuple[str, str]] = set()
-    for cell in find_cells(results):
+    for cell in reported_cells(results):
         record = cell.record
         if not cell.is_done or record.variant != DEFAULT:
             continue

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
-from codesign_bench.storage.cells import find_cells
+from codesign_bench.storage.cells import reported_cells
 from codesign_bench.storage.frames import load_evaluations, load_results
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def tasks_in(results: Path) -> list[str]:
     Raises:
         UserError: there is none.
     """
-    found = list(dict.fromkeys(cell.record.task for cell in find_cells(results)))
+    found = list(dict.fromkeys(cell.record.task for cell in reported_cells(results)))
     if not found:
         raise UserError(f"no cells in '{results}' yet; give the figure's name to draw it without cells")
     return found

@@ -15,6 +15,7 @@ from typing import Any
 import cma
 import numpy as np
 
+from codesign_bench.config.search import Integer, LogUniform
 from codesign_bench.config.validation import check_range
 from codesign_bench.task import Floats
 
@@ -25,9 +26,9 @@ PYCMA = {"source": "pycma's default"}
 class EvolutionConfig:
     """Hyperparameters of CMA-ES; the four learning rates are pycma's options of the same meaning."""
 
-    popsize: int = 24
+    popsize: int = field(default=24, metadata={"search": Integer(6, 32, log=True)})
     """Candidates of a generation."""
-    sigma0: float = 0.1
+    sigma0: float = field(default=0.1, metadata={"search": LogUniform(0.05, 0.6)})
     """Initial standard deviation; parameters are in [-1, 1]."""
     center_learning_rate: float = field(default=1.0, metadata=PYCMA)
     """Learning rate of the mean (pycma's `CMA_cmean`)."""

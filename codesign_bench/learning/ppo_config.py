@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Literal, TypeAlias
 
+from codesign_bench.config.search import Choice, Integer, LogUniform, Uniform
 from codesign_bench.config.validation import check_choices, check_given, check_range
 
 Credit: TypeAlias = Literal["joint", "separate"]
@@ -13,39 +14,43 @@ Precision: TypeAlias = Literal["fp32", "bf16"]
 
 TRANSFORM2ACT = {"source": "Transform2Act's default; the paper is silent"}
 OURS = {"source": "ours"}
+SEPARATE = ("design_credit", "separate")
+"""Condition under which the designer has an update of its own."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PPOConfig:
     """Hyperparameters of every PPO-based method. All have defaults, and any task runs with the defaults."""
 
-    batch_size: int = 10_000
+    batch_size: int = field(default=10_000, metadata={"search": Integer(5_000, 40_000, log=True)})
     """Environment steps per batch; episodes are finished."""
-    minibatch_size: int = 500
+    minibatch_size: int = field(default=500, metadata={"search": Integer(250, 2_000, log=True)})
     """Environment steps per minibatch."""
-    epochs: int = 4
+    epochs: int = field(default=4, metadata={"search": Integer(2, 10)})
     """Passes over a batch (the paper's "PPO steps per batch")."""
-    policy_learning_rate: float = 7e-4
+    policy_learning_rate: float = field(default=7e-4, metadata={"search": LogUniform(3e-5, 3e-3)})
     """Adam's learning rate for designer and controller."""
-    value_learning_rate: float = 7e-4
+    value_learning_rate: float = field(default=7e-4, metadata={"search": LogUniform(3e-5, 3e-3)})
     """Adam's learning rate for the value networks."""
     final_learning_rate_fraction: float = field(default=1.0, metadata=OURS)
     """Learning rates decrease linearly over the budget to this fraction of their initial values."""
     entropy_weight: float = 0.0
     """Weight of the entropy bonus; no effect with fixed standard deviations."""
-    kl_threshold: float = 0.05
+    kl_threshold: float = field(default=0.05, metadata={"search": LogUniform(0.01, 0.3)})
     """A batch's policy update stops at this estimated KL divergence."""
-    control_log_std: float = -0.5
+    control_log_std: float = field(default=-0.5, metadata={"search": Uniform(-2.0, 0.0)})
     """(Initial) log standard deviation of controls in [-1, 1]."""
-    design_log_std: float = -1.0
+    design_log_std: float = field(default=-1.0, metadata={"search": Uniform(-2.0, 0.0)})
     """(Initial) log standard deviation of designs in [-1, 1]."""
     fix_std: bool = True
     """Whether the standard deviations are fixed instead of learned."""
-    gamma: float = field(default=0.995, metadata=TRANSFORM2ACT)
+    gamma: float = field(
+        default=0.995, metadata={**TRANSFORM2ACT, "search": Choice((0.95, 0.97, 0.98, 0.99, 0.995, 0.999))}
+    )
     """Discount factor per step."""
-    gae_lambda: float = field(default=0.95, metadata=TRANSFORM2ACT)
+    gae_lambda: float = field(default=0.95, metadata={**TRANSFORM2ACT, "search": Uniform(0.9, 1.0)})
     """Lambda of generalised advantage estimation."""
-    clip_ratio: float = field(default=0.2, metadata=TRANSFORM2ACT)
+    clip_ratio: float = field(default=0.2, metadata={**TRANSFORM2ACT, "search": Uniform(0.1, 0.3)})
     """Clipping range of the probability ratio."""
     max_gradient_norm: float = field(default=40.0, metadata=TRANSFORM2ACT)
     """Largest gradient norm; larger gradients are scaled down."""
@@ -59,13 +64,13 @@ class PPOConfig:
     """Credit of the design step: `joint` (the paper's) or `separate` (ours)."""
     batch_design: bool = field(default=False, metadata=OURS)
     """Under joint credit, whether an epoch's first minibatches hold all design steps; False spreads them over all."""
-    design_learning_rate: float = 7e-4
+    design_learning_rate: float = field(default=7e-4, metadata={"search": LogUniform(1e-4, 3e-2, where=SEPARATE)})
     """Adam's learning rate for the designer under separate credit."""
-    design_epochs: int = field(default=10, metadata=OURS)
+    design_epochs: int = field(default=10, metadata={**OURS, "search": Integer(2, 20, where=SEPARATE)})
     """Passes over a batch's design steps under separate credit."""
     design_minibatch_size: int = field(default=1_000, metadata=OURS)
     """Design steps per minibatch under separate credit."""
-    design_kl_threshold: float = field(default=0.05, metadata=OURS)
+    design_kl_threshold: float = field(default=0.05, metadata={**OURS, "search": LogUniform(0.01, 1.0, where=SEPARATE)})
     """Under separate credit, the design update stops at this estimated KL divergence."""
     precision: Precision = field(default="fp32", metadata=OURS)
     """`fp32`, or `bf16` for matrix products in updates: several times as fast on processors with bfloat16 units."""

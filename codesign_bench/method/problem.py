@@ -27,6 +27,8 @@ class Problem:
     tradeoff: Tradeoff | None = None
     instances: Floats | None = None
     """(k, I) the only instances for training and evaluation; None: the task's instances."""
+    validation: bool = False
+    """Whether the method is evaluated on the task's validation instances, on which settings are chosen."""
 
     @cached_property
     def simulators(self) -> Simulators:
@@ -55,4 +57,6 @@ class Problem:
 
     def evaluation_instances(self) -> Floats:
         """Return the (N, I) instances on which the method is evaluated."""
-        return self.task.evaluation_instances() if self.instances is None else self.instances
+        if self.instances is not None:
+            return self.instances
+        return self.task.validation_instances() if self.validation else self.task.evaluation_instances()

@@ -59,7 +59,7 @@ class CellFailure:
 
 
 def read_cells(results: Path) -> tuple[list[PageCell], list[str]]:
-    """Return every cell below `results`, and the names of those with a damaged or foreign cell file.
+    """Return every reported cell below `results`, and the names of those with a damaged or foreign cell file.
 
     Raises:
         UserError: the folder does not exist or contains no cells.
@@ -68,6 +68,7 @@ def read_cells(results: Path) -> tuple[list[PageCell], list[str]]:
     cells = [
         PageCell(cell.folder.relative_to(results).as_posix(), cell.record, cell.status, status_row(results, cell))
         for cell in found
+        if cell.is_reported
     ]
     read = {cell.folder for cell in found}
     damaged = [path.parent for path in sorted(results.glob(CELL_PATTERN)) if path.parent not in read]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from codesign_bench.config.run_settings import EVALUATION
 from codesign_bench.errors import UserError
 from codesign_bench.storage.layout import CELL_PATTERN, CURVE_FILE, POLICY_FILE, is_locked
 from codesign_bench.storage.records import CELL_FILE, DONE, INTERRUPTED, RUNNING, CellRecord
@@ -29,6 +30,12 @@ class StoredCell:
     def is_done(self) -> bool:
         """Whether the cell is finished."""
         return self.record.status == DONE
+
+    @property
+    def is_reported(self) -> bool:
+        """Whether it was evaluated on evaluation instances; cells of tuning were not, and no result includes them."""
+        instances = self.record.config.run.get("instances")
+        return instances is None or instances.value == EVALUATION
 
     @property
     def has_policy(self) -> bool:
@@ -71,3 +78,12 @@ def find_cells(out: Path) -> Iterator[StoredCell]:
             yield open_cell(path.parent)
         except UserError:
             continue
+
+
+def reported_cells(out: Path) -> Iterator[StoredCell]:
+    """Yield the cells below `out` that results include: all but those that were evaluated on validation instances.
+
+    Raises:
+        UserError: the folder does not exist.
+    """
+    return (cell for cell in find_cells(out) if cell.is_reported)

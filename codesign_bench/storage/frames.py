@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from codesign_bench.cell.axes import axis_named
 from codesign_bench.cell.variant import DEFAULT_NAME, FIRST_AXES, Value, Variant, in_axis_order
 from codesign_bench.errors import UserError
-from codesign_bench.storage.cells import StoredCell, find_cells
+from codesign_bench.storage.cells import StoredCell, reported_cells
 from codesign_bench.storage.layout import CURVE_COLUMNS, CURVE_FILE, EVALUATION_FILE
 
 if TYPE_CHECKING:  # pandas takes a second to import; cell processes do not need it
@@ -22,6 +22,8 @@ LABEL_COLUMN = "label"
 def load_results(out: str | Path) -> pd.DataFrame:
     """Return every evaluation of every cell below `out`, including running and failed cells, as one tidy frame.
 
+    Cells of tuning, which are evaluated on validation instances, are left out.
+
     Columns: task, method, variant, one for each axis (cutout, alpha, finetune, scratch, and any other axis of a cell;
     NaN where it is not varied), seed, label, then those of `curve.csv`.
 
@@ -30,7 +32,7 @@ def load_results(out: str | Path) -> pd.DataFrame:
     """
     import pandas as pd
 
-    parts = [(cell, curve) for cell in find_cells(Path(out)) if (curve := _read_curve(cell)) is not None]
+    parts = [(cell, curve) for cell in reported_cells(Path(out)) if (curve := _read_curve(cell)) is not None]
     if not parts:
         raise UserError(f"no results in '{out}' yet; create some with: codesign-bench run --out {out}")
     frame = pd.concat(_with_cell_columns(parts), ignore_index=True)
@@ -50,7 +52,7 @@ def load_evaluations(out: str | Path) -> pd.DataFrame:
     import pandas as pd
 
     parts = []
-    for cell in find_cells(Path(out)):
+    for cell in reported_cells(Path(out)):
         if cell.is_done and (cell.folder / EVALUATION_FILE).exists():
             table = pd.read_csv(cell.folder / EVALUATION_FILE)
             table.insert(0, "instance", range(len(table)))

@@ -14,6 +14,7 @@ from codesign_bench.config.profiles import Profile
 from codesign_bench.errors import unknown_name
 from codesign_bench.registry import load_attribute, names
 from codesign_bench.study.experiment import Experiment
+from codesign_bench.study.tuning import Tuning
 
 if TYPE_CHECKING:  # claims need pandas and scipy; listing studies does not
     from codesign_bench.claims.claim import Claim
@@ -49,6 +50,8 @@ class Study:
     """Additional profiles."""
     axes: tuple[Axis, ...] = ()
     """Additional axes of its cells."""
+    tuning: Tuning | None = None
+    """How settings of its methods are searched; None: they are not."""
 
     @property
     def figures(self) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ from codesign_bench.task.tool import ToolGraph, ToolPart
 
 NOTHING_NAMED: Mapping[str, Any] = MappingProxyType({})
 EVALUATION_SEED = 20231106
-"""Seed of every task's fixed evaluation instances, never used in training (ours)."""
+"""Seed of every task's fixed evaluation and validation instances, never used in training (ours)."""
 
 
 ByProfile: TypeAlias = Mapping[str, Mapping[str, Any]]
@@ -97,6 +97,11 @@ class Task(ABC):
     def evaluation_instances(self) -> Floats:
         """Return the (num_evaluation_instances, I) fixed instances on which every method is evaluated."""
         return self.sample_instances(generator(EVALUATION_SEED, self.name), self.num_evaluation_instances)
+
+    def validation_instances(self) -> Floats:
+        """Return as many other fixed instances, on which settings are chosen; no reported result uses them."""
+        rng = generator(EVALUATION_SEED, f"validation of {self.name}")
+        return self.sample_instances(rng, self.num_evaluation_instances)
 
     @property
     def position_index(self) -> list[int]:

@@ -111,6 +111,7 @@ def test_fine_tuning_without_a_finished_default_cell_says_what_to_run(tmp_path: 
         ({"alpha": -0.1}, "--alpha must be between 0 and 1, not -0.1"),
         ({"scratch": 3}, "--scratch 3: task 'toy_reach' has fine-tuning instances 1 to 2"),
         ({"finetune": 0}, "--finetune 0: task 'toy_reach' has fine-tuning instances 1 to 2"),
+        ({"setting": -1}, "--variant setting=-1: must not be negative"),
         ({"colour": "red"}, "unknown axis 'colour'; choose from: cutout, alpha, finetune, scratch"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from codesign_bench.cli import main
 from codesign_bench.cli.program import build_parser
 from codesign_bench.cli.run import overrides
+from codesign_bench.storage.records import CellRecord
 
 pytestmark = pytest.mark.usefixtures("toy")
 
@@ -40,6 +42,21 @@ def test_another_configuration_is_refused(tmp_path: Path, capsys: pytest.Capture
     assert main([*RUN, "--out", str(tmp_path)]) == 0
     assert main([*RUN, "episodes=9", "--out", str(tmp_path)]) == 2
     assert "episodes: stored 4, requested 9" in capsys.readouterr().err
+
+
+def test_settings_of_a_search_are_those_of_the_cells_task_and_method(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tuned, out = tmp_path / "tuned.json", tmp_path / "runs"
+    winner = {"task": "toy_reach", "method": "toy_search", "set": ["toy_search.episodes=5", "toy_search.step_size=0.2"]}
+    tuned.write_text(json.dumps({"winners": [winner]}))
+    assert main([*RUN, "step_size=0.1", "--tuned", str(tuned), "--jobs", "1", "--out", str(out)]) == 0
+    record = CellRecord.read(out / "toy_reach/toy_search/default/seed-00")
+    assert record is not None
+    assert (record.config.method["episodes"].value, record.config.method["step_size"].value) == (5, 0.1)
+    tuned.write_text(json.dumps({"winners": [{**winner, "task": "push"}]}))
+    assert main([*RUN, "--tuned", str(tuned), "--out", str(out)]) == 2
+    assert "has no settings of 'toy_search' on 'toy_reach'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from codesign_bench import method_names, task_names
@@ -16,8 +18,8 @@ def test_show_tells_the_source_of_every_value(capsys: pytest.CaptureFixture[str]
     rows = {line.split()[1]: line for line in capsys.readouterr().out.splitlines()}
     assert rows["version"].split() == ["task", "version", "1", "toy_reach"]
     assert rows["widths"].split(maxsplit=4)[2:] == ["[1,", "2]", "--set"]
-    assert rows["step_size"].endswith("toy paper, table 1")
-    assert rows["episodes"].endswith("toy paper, table 2")
+    assert re.search(r"toy paper, table 1 +0\.01 to 1, log$", rows["step_size"])
+    assert re.search(r"toy paper, table 2 +integers 2 to 8$", rows["episodes"])
     assert rows["steps"].endswith("paper, learning curves")
 
 

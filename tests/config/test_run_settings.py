@@ -15,6 +15,7 @@ from codesign_bench.config.run_settings import RunSettings
         ({"fine_tuning_steps": -1}, "fine_tuning_steps must be at least 1, not -1"),
         ({"threads": 0}, "threads must be at least 1, not 0"),
         ({"tradeoff_scale": -0.5}, "tradeoff_scale must not be negative: -0.5"),
+        ({"instances": "training"}, "instances must be evaluation or validation, not 'training'"),
         ({"device": "abacus"}, "device must be one of cpu, cuda, not 'abacus'"),
     ],
 )

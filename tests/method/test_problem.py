@@ -45,6 +45,13 @@ def test_given_instances_are_the_only_ones(reach: Task) -> None:
     assert problem.evaluation_instances() is given
 
 
+def test_settings_are_chosen_on_other_instances(reach: Task) -> None:
+    chosen = Problem(reach, validation=True).evaluation_instances()
+    np.testing.assert_array_equal(chosen, reach.validation_instances())
+    assert not set(chosen.ravel()) & set(reach.evaluation_instances().ravel())
+    assert Problem(reach, instances=chosen[:2], validation=True).evaluation_instances().shape == (2, 1)
+
+
 def test_lent_episodes_pay_the_tradeoff(reach: Task) -> None:
     slots, still = np.array([0]), np.zeros((1, 1))
     rewards = []

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from codesign_bench.config.settings import Sourced, StoredConfig
 from codesign_bench.report.cells import read_cells
 from codesign_bench.storage.records import CELL_FILE
-from reports import Reader, make_cell
+from reports import Reader, config, make_cell
 
 
 def test_cells_are_counted_by_status_and_damaged_ones_named(page: str) -> None:
@@ -26,3 +27,12 @@ def test_a_cell_file_without_the_usual_parts_is_named_as_unreadable(tmp_path: Pa
     cells, damaged = read_cells(tmp_path)
     assert [cell.name[-7:] for cell in cells] == ["seed-00"]
     assert [name[-7:] for name in damaged] == ["seed-01", "seed-02", "seed-03"]
+
+
+def test_cells_of_tuning_are_neither_shown_nor_called_unreadable(tmp_path: Path) -> None:
+    make_cell(tmp_path, 0)
+    run = {**config().run, "instances": Sourced("validation", "variant")}
+    make_cell(tmp_path, 1, config=StoredConfig(run, config().method))
+    cells, damaged = read_cells(tmp_path)
+    assert [cell.name[-7:] for cell in cells] == ["seed-00"]
+    assert damaged == []

@@ -200,6 +200,15 @@ def test_evaluation_instances_are_fixed_different_and_inside_the_instance_space(
     assert np.abs(task.instance_space.to_unit(instances)).max() <= 1.0
 
 
+def test_validation_instances_are_as_many_as_evaluation_instances_and_none_of_them(task: Task) -> None:
+    validation, evaluation = task.validation_instances(), task.evaluation_instances()
+    np.testing.assert_array_equal(validation, load_task(task.name).validation_instances())
+    assert validation.shape == evaluation.shape
+    together = np.concatenate([validation, evaluation])
+    assert len(np.unique(together, axis=0)) == len(together)
+    assert np.abs(task.instance_space.to_unit(validation)).max() <= 1.0
+
+
 def test_instances_follow_their_generator(task: Task) -> None:
     first, again, other = (task.sample_instances(np.random.default_rng(seed), 8) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from codesign_bench.studies.corl2023.experiments import EXPERIMENTS
-from codesign_bench.studies.corl2023.members import METHODS
+from codesign_bench.studies.corl2023.members import METHODS, TASKS
 from codesign_bench.studies.corl2023.profile import PAPER
 from codesign_bench.study.study import Study
+from codesign_bench.study.tuning import Tuning
 
 if TYPE_CHECKING:
     from codesign_bench.claims.claim import Claim
@@ -35,4 +36,5 @@ STUDY = Study(
     experiments=EXPERIMENTS,
     claims=claims,
     profiles=(PAPER,),
+    tuning=Tuning(methods=METHODS, tasks=TASKS, settings=18, rungs=3, eta=3, seeds=(0, 1)),
 )

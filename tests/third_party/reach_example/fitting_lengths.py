@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from codesign_bench.cell.axes import Axis
 from codesign_bench.cell.variant import Value, Variant
-from codesign_bench.study import Experiment, Grid, Study
+from codesign_bench.study import FIRST_REPORTED_SEED, Experiment, Grid, Study, Tuning
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from codesign_bench.claims.finding import Finding
 
 TASK, METHOD = "reach", "random_search"
-SEEDS = (100, 101, 102)
+SEEDS = tuple(range(FIRST_REPORTED_SEED, FIRST_REPORTED_SEED + 3))
 
 
 class Practice(Axis):
@@ -76,4 +76,5 @@ STUDY = Study(
     },
     claims=claims,
     axes=(Practice(),),
+    tuning=Tuning(methods=(METHOD, "sac"), tasks=(TASK,), settings=9, rungs=2, eta=3, seeds=(0, 1)),
 )

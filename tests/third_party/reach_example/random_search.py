@@ -6,11 +6,12 @@ Shapes: `B` batch (may be absent), `O` observation, `D` design, `C` control, `G`
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from codesign_bench.config.search import Integer, LogUniform
 from codesign_bench.method import Array, BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Floats, Singles, Task
@@ -20,11 +21,11 @@ from codesign_bench.task import Floats, Singles, Task
 class Config:
     """Hyperparameters of the search."""
 
-    batch_size: int = 500
+    batch_size: int = field(default=500, metadata={"search": Integer(100, 2_000, log=True)})
     """Environment steps spent on one candidate."""
-    practice: int = 16
+    practice: int = field(default=16, metadata={"search": Integer(1, 64, log=True)})
     """Number of instances for all candidates, in turn: new instances for each would reward luck."""
-    step_size: float = 0.3
+    step_size: float = field(default=0.3, metadata={"search": LogUniform(0.03, 1.0)})
     """Standard deviation of a candidate's distance from the best policy, per weight."""
 
 

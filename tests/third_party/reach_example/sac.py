@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from codesign_bench.config.search import Choice, Integer, LogUniform
 from codesign_bench.learning.batches import BatchCollector
 from codesign_bench.learning.checkpointing import learner_arrays, load_learner_arrays, load_module_arrays
 from codesign_bench.learning.explorer import Explorer, Sample
@@ -36,19 +37,19 @@ class Config:
 
     batch_size: int = 1_000
     """Environment steps between two rounds of updates; episodes are finished."""
-    updates_per_step: float = 0.25
+    updates_per_step: float = field(default=0.25, metadata={"search": LogUniform(0.05, 0.5)})
     """Gradient steps per environment step."""
-    minibatch_size: int = 256
+    minibatch_size: int = field(default=256, metadata={"search": Integer(64, 512, log=True)})
     """Transitions per gradient step."""
     replay_size: int = 100_000
     """Capacity of the replay buffer, transitions."""
-    learning_rate: float = 3e-3
+    learning_rate: float = field(default=3e-3, metadata={"search": LogUniform(3e-4, 1e-2)})
     """Adam's learning rate for actor, critics and temperatures."""
-    gamma: float = 0.95
+    gamma: float = field(default=0.95, metadata={"search": Choice((0.9, 0.95, 0.98, 0.99))})
     """Discount factor per step."""
-    target_rate: float = 0.02
+    target_rate: float = field(default=0.02, metadata={"search": LogUniform(3e-3, 0.1)})
     """Fraction by which target networks move towards their critics in each step."""
-    temperature: float = 0.03
+    temperature: float = field(default=0.03, metadata={"search": LogUniform(3e-3, 0.3)})
     """Initial weight of the entropy, for designs and for controls; both are adapted."""
     hidden: tuple[int, ...] = (64, 64)
     """Widths of the hidden layers of actor and critics."""

@@ -1,0 +1,54 @@
+"""`codesign-bench tune`: search the settings of a study's methods, with the same random search for each of them."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+from pathlib import Path
+
+from rich.console import Console
+
+from codesign_bench.cli.arguments import add_jobs, add_profile, add_study, add_sweep, check_at_least_one, integer
+from codesign_bench.study import load_study
+
+HELP = "search the settings of every method of a study, with the same effort"
+DEFAULT_FOLDER = Path("results/tuning")
+"""Each study has a folder below it."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the study, the budget, the output folder, and how to run the cells; the size of the search is the study's."""
+    add_study(parser)
+    add_profile(parser)
+    parser.add_argument(
+        "--steps", type=integer, metavar="N", help="budget of a cell in the last rung (default: the profile's)"
+    )
+    parser.add_argument("--plan", action="store_true", help="print the rungs and the steps that they take, and stop")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help=f"output folder; default: {DEFAULT_FOLDER}/<name of the study>"
+    )
+    add_jobs(parser)
+    add_sweep(parser)
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Search, or print the plan; return 1 if a cell failed."""
+    from codesign_bench.tuning.tune import print_plan, tune, tuning_of
+
+    check_at_least_one(options, "steps", "jobs")
+    study = load_study(options.study)
+    if options.plan:
+        print_plan(console, tuning_of(study), options.profile, options.steps)
+        return 0
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does
+    return tune(
+        study,
+        profile=options.profile,
+        out=DEFAULT_FOLDER / study.name if options.out is None else options.out,
+        console=console,
+        steps=options.steps,
+        jobs=options.jobs,
+        retry_failed=options.retry_failed,
+        backend=options.backend,
+        scheduler=options.scheduler,
+    )

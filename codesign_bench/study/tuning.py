@@ -1,0 +1,56 @@
+"""How a study searches the settings of its methods: a random search of the same size for every method on every task.
+
+Successive halving (Jamieson and Talwalkar 2016) gives most steps to the settings that do well: after each rung, one
+setting in `eta` goes on to a budget `eta` times as large. Every rung trains from the start. Continuing the cells of the
+last rung would be cheaper, but learning rates decrease over the budget, so a continued cell would not be the cell that
+the larger budget gives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+TUNING_SEEDS = range(10)
+"""Seeds on which settings may be chosen."""
+FIRST_REPORTED_SEED = 100
+"""First seed of experiments that report results of tuned settings; such seeds were never used in tuning."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """The search for settings: the same number of random settings and the same steps for every method on every task."""
+
+    methods: tuple[str, ...]
+    tasks: tuple[str, ...]
+    settings: int
+    """Random settings that start, for every method on every task."""
+    rungs: int = 3
+    eta: int = 3
+    """One setting in `eta` goes on to the next rung, whose budget is `eta` times as large."""
+    seeds: tuple[int, ...] = (0, 1)
+    """Seeds of every setting, some of `TUNING_SEEDS`; the mean over them counts."""
+    draw: int = 0
+    """Seed from which the settings are drawn."""
+
+    def __post_init__(self) -> None:
+        if self.rungs < 1 or self.eta < 2:
+            raise ValueError(f"tuning needs at least 1 rung and eta 2, not {self.rungs} and {self.eta}")
+        if self.sizes[-1] < 1:
+            raise ValueError(f"{self.settings} settings are too few for {self.rungs} rungs with eta {self.eta}")
+        if not self.seeds or not set(self.seeds) <= set(TUNING_SEEDS) or len(set(self.seeds)) < len(self.seeds):
+            raise ValueError(f"seeds of tuning must be different ones from 0 to {TUNING_SEEDS[-1]}, not {self.seeds}")
+
+    @property
+    def sizes(self) -> list[int]:
+        """Number of settings in each rung, for every method on every task."""
+        return [self.settings // self.eta**rung for rung in range(self.rungs)]
+
+    def budgets(self, steps: int) -> list[int]:
+        """Return the budget of a cell in each rung, in environment steps; the last rung has the budget `steps`."""
+        return [max(1, round(steps / self.eta ** (self.rungs - 1 - rung))) for rung in range(self.rungs)]
+
+    def steps(self, steps: int) -> int:
+        """Return the environment steps of the whole search for one method on one task with the budget `steps`."""
+        return len(self.seeds) * sum(
+            size * budget for size, budget in zip(self.sizes, self.budgets(steps), strict=True)
+        )

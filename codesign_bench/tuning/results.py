@@ -1,0 +1,91 @@
+"""The files of a search: `tuning.csv` with every setting in every rung, `tuned.json` with the best settings."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from codesign_bench.errors import UserError
+from codesign_bench.storage.files import write_json
+from codesign_bench.storage.layout import write_rows
+from codesign_bench.study.tuning import Tuning
+from codesign_bench.tuning.scores import Score
+
+TABLE_FILE, WINNERS_FILE = "tuning.csv", "tuned.json"
+COLUMNS = ("task", "method", "setting", "rung", "steps", "seeds", "env_steps", "validation_return", "kept")
+"""Columns of the table before those of the hyperparameters, which are empty where a method has none of the name."""
+
+
+def write_table(out: Path, tuning: Tuning, scores: Sequence[Score], kept: Sequence[Score]) -> None:
+    """Write one row per setting and rung; `kept` are those that went on, or won the last rung."""
+    rows = [
+        {
+            "task": found.setting.task,
+            "method": found.setting.method,
+            "setting": found.setting.number,
+            "rung": found.rung,
+            "steps": found.steps,
+            "seeds": " ".join(map(str, tuning.seeds)),
+            "env_steps": found.env_steps,
+            "validation_return": found.validation_return,
+            "kept": int(any(found is other for other in kept)),
+            **found.setting.values,
+        }
+        for found in scores
+    ]
+    write_rows(out / TABLE_FILE, rows, COLUMNS)
+
+
+def spent(scores: Sequence[Score]) -> dict[str, int]:
+    """Return the environment steps of the search for each method."""
+    steps: dict[str, int] = {}
+    for found in scores:
+        steps[found.setting.method] = steps.get(found.setting.method, 0) + found.env_steps
+    return steps
+
+
+def write_winners(
+    out: Path, header: Mapping[str, Any], tuning: Tuning, scores: Sequence[Score], winners: Sequence[Score]
+) -> None:
+    """Write the best setting of every method on every task, for `run --tuned`.
+
+    Args:
+        out: the results folder.
+        header: what the file says of the search besides its size.
+        tuning: the search.
+        scores: of all rungs, for the steps that the search took.
+        winners: the best scores of the last rung.
+    """
+    content = {
+        **header,
+        "tuning": asdict(tuning),
+        "env_steps": spent(scores),
+        "winners": [
+            {
+                "task": winner.setting.task,
+                "method": winner.setting.method,
+                "setting": winner.setting.number,
+                "validation_return": winner.validation_return,
+                "values": dict(winner.setting.values),
+                "set": list(winner.setting.overrides),
+            }
+            for winner in winners
+        ],
+    }
+    write_json(out / WINNERS_FILE, content)
+
+
+def read_winners(path: Path) -> dict[tuple[str, str], tuple[str, ...]]:
+    """Return (task, method) -> the best setting in the form of `--set`, from a file that `tune` wrote.
+
+    Raises:
+        UserError: there is no such file, or it is another one.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return {(str(entry["task"]), str(entry["method"])): tuple(entry["set"]) for entry in content["winners"]}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise UserError(f"cannot read '{path}', which `codesign-bench tune` writes ({error})") from error

@@ -1,0 +1,71 @@
+"""Scores of settings: the mean over tuning seeds of the return on validation instances at the end of training."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isnan, nan
+from pathlib import Path
+
+from codesign_bench.cell.cell import Cell
+from codesign_bench.storage.cells import StoredCell
+from codesign_bench.storage.records import CellRecord
+from codesign_bench.tuning.settings import Setting
+
+
+@dataclass(frozen=True)
+class Score:
+    """What a setting reached in a rung."""
+
+    setting: Setting
+    rung: int
+    steps: int
+    """Budget of each of its cells."""
+    env_steps: int
+    """Environment steps of all of its cells together."""
+    validation_return: float
+    """NaN if one of its cells failed."""
+
+    @property
+    def failed(self) -> bool:
+        """Whether one of its cells failed; the setting then goes no further."""
+        return isnan(self.validation_return)
+
+
+def score(setting: Setting, rung: int, cells: Sequence[Cell], out: Path) -> Score:
+    """Return the score of a setting from its cells in the results folder `out`; all of them have ended."""
+    ended = [_ended(cell.folder(out)) for cell in cells]
+    return Score(
+        setting=setting,
+        rung=rung,
+        steps=cells[0].steps or 0,
+        env_steps=sum(env_steps for env_steps, _ in ended),
+        validation_return=sum(value for _, value in ended) / len(ended),
+    )
+
+
+def _ended(folder: Path) -> tuple[int, float]:
+    """Return a cell's environment steps and its final return, NaN if it failed."""
+    record = CellRecord.read(folder)
+    if record is None:  # its process died before it could record anything
+        return 0, nan
+    cell = StoredCell(folder, record)
+    return record.env_steps, cell.last_evaluation()["return_mean"] if cell.is_done else nan
+
+
+def best(scores: Sequence[Score], count: int) -> list[Score]:
+    """Return the `count` best scores, best first; of equal ones the setting drawn first, and those with NaN last."""
+
+    def place(found: Score) -> tuple[bool, float, int]:
+        return found.failed, 0.0 if found.failed else -found.validation_return, found.setting.number
+
+    return sorted(scores, key=place)[:count]
+
+
+def survivors(scores: Sequence[Score], count: int) -> list[Score]:
+    """Return the `count` best scores of every method on every task, in the given order; failed ones are left out."""
+    groups: dict[tuple[str, str], list[Score]] = {}
+    for found in scores:
+        groups.setdefault((found.setting.task, found.setting.method), []).append(found)
+    chosen = {id(found) for group in groups.values() for found in best(group, count)}
+    return [found for found in scores if id(found) in chosen and not found.failed]

@@ -1,0 +1,58 @@
+"""The random settings of a method on a task, and their cells in a rung."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from codesign_bench.cell.cell import Cell
+from codesign_bench.cell.variant import Variant
+from codesign_bench.config.resolve import resolve
+from codesign_bench.config.search import draw, ranges
+from codesign_bench.errors import UserError
+from codesign_bench.method import load_method
+from codesign_bench.study.tuning import Tuning
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One random setting of all searched hyperparameters of a method on a task."""
+
+    task: str
+    method: str
+    number: int
+    """Its place among the settings that were drawn, from 0."""
+    values: Mapping[str, Any]
+    """Hyperparameter -> value."""
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """Its values in the form of `--set`."""
+        return tuple(f"{self.method}.{name}={value}" for name, value in self.values.items())
+
+    def cells(self, tuning: Tuning, rung: int, profile: str, steps: int) -> list[Cell]:
+        """Return its cells in a rung, one for each seed, with a budget of `steps`."""
+        variant = Variant.of(rung=rung, setting=self.number)
+        return [Cell(self.task, self.method, seed, variant, profile, steps, self.overrides) for seed in tuning.seeds]
+
+
+def settings_of(tuning: Tuning, task: str, method: str, profile: str) -> list[Setting]:
+    """Return the settings with which the search of a method on a task starts.
+
+    The shipped values are not among them: they are the result of earlier tuning, of which some methods got more.
+
+    Raises:
+        UserError: the method declares no range.
+    """
+    searched = ranges(resolve(load_method(method), task, profile).method)
+    if not searched:
+        raise UserError(f"'{method}' declares no range to search; see docs/tuning.md")
+    drawn = draw(searched, tuning.settings, tuning.draw)
+    return [Setting(task, method, number, values) for number, values in enumerate(drawn)]
+
+
+def cells_in_turn(cells: Iterable[list[Cell]]) -> list[Cell]:
+    """Return the cells of several settings, ordered so that an unfinished rung has about as many of each method."""
+    everything = [cell for of_setting in cells for cell in of_setting]
+    return sorted(everything, key=lambda cell: (cell.task, cell.seed, cell.variant.values))

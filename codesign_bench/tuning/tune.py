@@ -1,0 +1,129 @@
+"""Search the settings of a study's methods, rung by rung, on top of sweeps: `codesign-bench tune`."""
+
+from __future__ import annotations
+
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+from rich.console import Console
+
+from codesign_bench.cell.cell import resolve_cells
+from codesign_bench.config.resolve import resolve
+from codesign_bench.console import Log, print_table, printer
+from codesign_bench.errors import UserError
+from codesign_bench.method import load_method
+from codesign_bench.study.study import Study
+from codesign_bench.study.tuning import FIRST_REPORTED_SEED, Tuning
+from codesign_bench.sweep.runner import EXIT_ALL_DONE, run_sweep
+from codesign_bench.tuning.results import TABLE_FILE, WINNERS_FILE, spent, write_table, write_winners
+from codesign_bench.tuning.scores import Score, score, survivors
+from codesign_bench.tuning.settings import cells_in_turn, settings_of
+
+
+def tuning_of(study: Study) -> Tuning:
+    """Return the study's search.
+
+    Raises:
+        UserError: it has none.
+    """
+    if study.tuning is None:
+        raise UserError(f"the study '{study.name}' has no tuning; see docs/tuning.md")
+    return study.tuning
+
+
+def print_plan(console: Console, tuning: Tuning, profile: str, steps: int | None) -> None:
+    """Print the rungs of the search on every task, the same for every method, and the steps of each method."""
+    budgets = {task: budgets_of(tuning, task, profile, steps) for task in tuning.tasks}
+    rows = [
+        (task, str(rung), str(size), f"{budget:,}", f"{size * budget * len(tuning.seeds):,}")
+        for task in tuning.tasks
+        for rung, (size, budget) in enumerate(zip(tuning.sizes, budgets[task], strict=True))
+    ]
+    log = printer(console)
+    print_table(console, ("task", "rung", "settings", "steps of a cell", "steps of a method"), rows)
+    each = sum(tuning.steps(budgets[task][-1]) for task in tuning.tasks)
+    log(f"the same for {', '.join(tuning.methods)}: {each:,} steps each, {each * len(tuning.methods):,} in all")
+
+
+def budgets_of(tuning: Tuning, task: str, profile: str, steps: int | None) -> list[int]:
+    """Return the budget of a cell in each rung on a task; the last one is that of the profile, or `steps`.
+
+    Raises:
+        UserError: an unknown name.
+    """
+    (full,) = {resolve(load_method(method), task, profile, (), steps).run.steps for method in tuning.methods}
+    return tuning.budgets(full)
+
+
+def tune(
+    study: Study,
+    *,
+    profile: str,
+    out: Path,
+    console: Console,
+    steps: int | None = None,
+    jobs: int | None = None,
+    retry_failed: bool = False,
+    backend: str = "loky",
+    scheduler: str | None = None,
+) -> int:
+    """Run the missing cells of the search and write its files; return 0, or 1 if some cell failed.
+
+    The rungs follow from the study and the stored cells alone, so the same call resumes an interrupted search.
+
+    Raises:
+        UserError: bad input, or a stored cell with another configuration.
+        KeyboardInterrupt: the user stopped the search.
+    """
+    tuning, log, code = tuning_of(study), printer(console), EXIT_ALL_DONE
+    budgets = {task: budgets_of(tuning, task, profile, steps) for task in tuning.tasks}
+    sweep = partial(
+        run_sweep,
+        out=out,
+        console=console,
+        jobs=jobs,
+        retry_failed=retry_failed,
+        backend=backend,
+        scheduler=scheduler,
+    )
+    alive = [
+        setting
+        for task, method in product(tuning.tasks, tuning.methods)
+        for setting in settings_of(tuning, task, method, profile)
+    ]
+    scores, kept, winners = list[Score](), list[Score](), list[Score]()
+    print_plan(console, tuning, profile, steps)
+    for rung, following in enumerate([*tuning.sizes[1:], 1]):
+        log(f"rung {rung + 1} of {tuning.rungs}")
+        cells = [setting.cells(tuning, rung, profile, budgets[setting.task][rung]) for setting in alive]
+        code = max(code, sweep(resolve_cells(cells_in_turn(cells))))
+        found = [score(setting, rung, part, out) for setting, part in zip(alive, cells, strict=True)]
+        winners = survivors(found, following)
+        alive = [winner.setting for winner in winners]
+        scores += found
+        kept += winners
+        write_table(out, tuning, scores, kept)
+    write_winners(out, {"study": study.name, "profile": profile}, tuning, scores, winners)
+    conclude(log, out, profile, winners, scores)
+    return code
+
+
+def conclude(log: Log, out: Path, profile: str, chosen: list[Score], scores: list[Score]) -> None:
+    """Print the best settings, what the search took, and how to train with them."""
+    for method, env_steps in spent(scores).items():
+        log(f"tuning of {method} took {env_steps:,} environment steps")
+    log(f"wrote {out / TABLE_FILE} and {out / WINNERS_FILE}")
+    if not chosen:
+        log("every setting failed")
+        return
+    for winner in chosen:
+        setting = winner.setting
+        log(f"{setting.task} {setting.method}: setting {setting.number}, return {winner.validation_return:.2f}")
+        log(f"  --set {' '.join(setting.overrides)}")
+    log("train with them on seeds that tuning did not use, for example:")
+    log(
+        f"codesign-bench run --method {' '.join(dict.fromkeys(found.setting.method for found in chosen))} "
+        f"--task {' '.join(dict.fromkeys(found.setting.task for found in chosen))} --profile {profile} "
+        f"--seeds {FIRST_REPORTED_SEED}-{FIRST_REPORTED_SEED + 9} --tuned {out / WINNERS_FILE} --out results/tuned"
+    )

@@ -1,0 +1,59 @@
+"""Scores: means over seeds of the last validation return; failed settings come last."""
+
+from __future__ import annotations
+
+from math import isnan, nan
+from pathlib import Path
+
+from builders import rising, store_cell
+from codesign_bench.cell.cell import Cell
+from codesign_bench.cell.variant import Variant
+from codesign_bench.storage.records import FAILED
+from codesign_bench.tuning.scores import Score, best, score, survivors
+from codesign_bench.tuning.settings import Setting
+
+SETTING = Setting("push", "gnn_ppo", 3, {"epochs": 2})
+VARIANT = Variant.of(rung=0, setting=3)
+CELLS = [Cell("push", "gnn_ppo", seed, VARIANT, steps=500) for seed in (0, 1)]
+
+
+def of(number: int, value: float, method: str = "gnn_ppo") -> Score:
+    """Return a score of the setting with a number."""
+    return Score(Setting("push", method, number, {}), 0, 500, 1000, value)
+
+
+def test_a_score_is_the_mean_over_seeds_of_the_last_return(tmp_path: Path) -> None:
+    store_cell(tmp_path, seed=0, variant=VARIANT, curve=rising(9.0, 2.0), env_steps=510)
+    store_cell(tmp_path, seed=1, variant=VARIANT, curve=rising(9.0, 3.0), env_steps=520)
+    found = score(SETTING, 0, CELLS, tmp_path)
+    assert found == Score(SETTING, 0, 500, 1030, 2.5)
+
+
+def test_a_failed_cell_leaves_no_score_but_its_steps_count(tmp_path: Path) -> None:
+    store_cell(tmp_path, seed=0, variant=VARIANT, curve=rising(9.0, 2.0), env_steps=510)
+    store_cell(tmp_path, seed=1, variant=VARIANT, curve=rising(9.0, 9.0), env_steps=100, status=FAILED)
+    found = score(SETTING, 0, CELLS, tmp_path)
+    assert isnan(found.validation_return)
+    assert found.env_steps == 610
+
+
+def test_a_cell_that_recorded_nothing_counts_as_failed(tmp_path: Path) -> None:
+    found = score(SETTING, 0, CELLS, tmp_path)
+    assert isnan(found.validation_return)
+    assert found.env_steps == 0
+
+
+def test_the_best_come_first_equal_ones_as_drawn_and_failed_ones_last() -> None:
+    scores = [of(0, nan), of(1, -2.0), of(2, 5.0), of(3, 5.0), of(4, -1.0)]
+    assert [found.setting.number for found in best(scores, 3)] == [2, 3, 4]
+    assert [found.setting.number for found in best(scores, 5)] == [2, 3, 4, 1, 0]
+
+
+def test_as_many_go_on_for_every_method_on_every_task_but_failed_ones() -> None:
+    scores = [
+        *(of(number, value) for number, value in enumerate((1.0, 3.0, 2.0))),
+        *(of(number, value, "cma_es") for number, value in enumerate((-5.0, nan, -4.0))),
+        *(of(number, nan, "cma_rl") for number in range(3)),
+    ]
+    going_on = [(found.setting.method, found.setting.number) for found in survivors(scores, 2)]
+    assert going_on == [("gnn_ppo", 1), ("gnn_ppo", 2), ("cma_es", 0), ("cma_es", 2)]

@@ -25,6 +25,7 @@ COMMANDS = (
     "verify",
     "report",
     "reproduce",
+    "reference",
     "render",
     "deploy",
     "export",

@@ -19,7 +19,7 @@ from codesign_bench.cell.variant import DEFAULT
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
-from codesign_bench.evaluation.sensitivity import GOALS, RANDOM_TOOLS, play_tools, tools_of
+from codesign_bench.evaluation.sensitivity import GOALS, RANDOM_TOOLS, play_tools, stored_table, tools_of
 from codesign_bench.registry import in_order
 from codesign_bench.seeding import generator
 from codesign_bench.storage.cells import StoredCell, find_cells
@@ -43,7 +43,7 @@ from codesign_bench.task.behaviours import Idle, Joined, RandomBehaviour
 if TYPE_CHECKING:
     import pandas as pd
 
-FINALISTS = 24
+FINALISTS = 16
 """Tools that play all evaluation instances, chosen among all tools by their returns on the first `GOALS` (ours)."""
 
 
@@ -69,7 +69,13 @@ def version_of(task: Task) -> int:
     return int(getattr(task, "version", 1))
 
 
-def measure(task: Task, random_tools: int = RANDOM_TOOLS, finalists: int = FINALISTS, jobs: int = 1) -> list[Point]:
+def measure(
+    task: Task,
+    random_tools: int = RANDOM_TOOLS,
+    finalists: int = FINALISTS,
+    jobs: int = 1,
+    tried: pd.DataFrame | None = None,
+) -> list[Point]:
     """Return the points that need no cells.
 
     A task without a script has no script and no single tool; its random tools have random controls.
@@ -79,6 +85,8 @@ def measure(task: Task, random_tools: int = RANDOM_TOOLS, finalists: int = FINAL
         random_tools: tools that compete to be the best single one, besides the script's own for a few goals.
         finalists: how many of them play all instances.
         jobs: processes that play side by side; the numbers do not depend on it.
+        tried: rows as `sensitivity.measure` gives them, by which finalists are chosen if they are of the same tools and
+            instances; None: they are played.
     """
     points = [_played(task, IDLE, Joined(_random(task, "tools"), Idle(task)), "random tools, held still")]
     try:
@@ -91,7 +99,7 @@ def measure(task: Task, random_tools: int = RANDOM_TOOLS, finalists: int = FINAL
         *points,
         _played(task, RANDOM_TOOL, moved, "random tools, the script's controller"),
         _played(task, SCRIPT, script, "hand-written tools and controller"),
-        *_single_tools(task, random_tools, finalists, jobs),
+        *_single_tools(task, random_tools, finalists, jobs, tried),
     ]
 
 
@@ -133,7 +141,7 @@ def measure_missing(results: Path, tasks: Iterable[str], log: Log, *, again: boo
         points = [] if again else _stored(task, results)
         if not points:
             log(f"playing the reference points of {name}; kept in {results / FILE}")
-            points = measure(task, jobs=jobs)
+            points = measure(task, jobs=jobs, tried=None if again else stored_table(results, name))
         points.append(best_known(task, points, results))
         _replace(results, results / FILE, name, summary_table(task, points))
         _replace(results, results / INSTANCES_FILE, name, instance_table(task, points))
@@ -192,19 +200,24 @@ def _played(task: Task, name: str, behaviour: Behaviour, source: str) -> Point:
     return Point(name, evaluation.returns, evaluation.successes.astype(np.float64), tools, source)
 
 
-def _single_tools(task: Task, random_tools: int, finalists: int, jobs: int) -> Iterator[Point]:
+def _single_tools(
+    task: Task, random_tools: int, finalists: int, jobs: int, tried: pd.DataFrame | None
+) -> Iterator[Point]:
     """Yield what the best single tool reaches, and what the best tool of each instance does.
 
-    All tools play the first `GOALS` instances; the best of them play the others, too. The single tool's return and
-    success are the highest means that one tool reaches, and need not be those of the same tool.
+    All tools play the first `GOALS` instances, and the best of them play all. The single tool's return and success are
+    the highest means that one tool reaches, and need not be those of the same tool.
     """
     instances = task.evaluation_instances()
-    first, others = instances[:GOALS], instances[GOALS:]
+    first = instances[:GOALS]
     designs = tools_of(task, first, random_tools)
-    tried = _play_all(task, designs, first, jobs)
-    chosen = np.argsort(-tried[0].mean(axis=1), kind="stable")[:finalists]
-    played = _play_all(task, designs[chosen], others, jobs)
-    returns, successes = (np.hstack([early[chosen], late]) for early, late in zip(tried, played, strict=True))
+    if tried is not None and len(tried) == len(designs) * len(first):
+        early = tried.pivot(index="tool", columns="goal", values="return").to_numpy()
+    else:
+        early, _ = _play_all(task, designs, first, jobs)
+    # What was played before chooses finalists and no more, so that an earlier scene cannot leave its numbers here.
+    chosen = np.argsort(-early.mean(axis=1), kind="stable")[:finalists]
+    returns, successes = _play_all(task, designs[chosen], instances, jobs)
     earns, solves = int(returns.mean(axis=1).argmax()), int(successes.mean(axis=1).argmax())
     told = f"tool {chosen[earns]} by return, tool {chosen[solves]} by success, of {len(designs)}"
     yield Point(SINGLE_TOOL, returns[earns], successes[solves], len(designs), told)
@@ -216,8 +229,6 @@ def _single_tools(task: Task, random_tools: int, finalists: int, jobs: int) -> I
 def _play_all(task: Task, designs: Floats, instances: Floats, jobs: int) -> tuple[Floats, Floats]:
     """Return the returns and successes (K, N) of every tool (K, D) on every instance (N, I)."""
     shape = len(designs), len(instances)
-    if not len(instances):
-        return np.zeros(shape), np.zeros(shape)
     tool, instance = (index.ravel() for index in np.indices(shape))
     _, returns, successes = play_tools(task, designs[tool], instances[instance], jobs)
     return returns.reshape(shape), successes.reshape(shape)
@@ -254,8 +265,8 @@ def _stored(task: Task, results: Path) -> list[Point]:
         rows = instances[_own(instances, task) & (instances["point"] == row["point"])].sort_values("instance")
         if len(rows) != task.num_evaluation_instances:
             return []
-        values = (rows[name].to_numpy(dtype=np.float64) for name in ("return", "success"))
-        points.append(Point(row["point"], *values, row["tools"], row["source"], rows["source"].tolist()))
+        returns, successes = (rows[name].to_numpy(dtype=np.float64) for name in ("return", "success"))
+        points.append(Point(row["point"], returns, successes, row["tools"], row["source"], rows["source"].tolist()))
     return [point for point in points if point.name != BEST_KNOWN]
 
 

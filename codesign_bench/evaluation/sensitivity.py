@@ -127,10 +127,15 @@ def load_sensitivity(results: Path) -> pd.DataFrame:
     """
     import pandas as pd
 
-    tables = [table for name in task_names() if (table := read_table(_path(results, name))) is not None]
+    tables = [table for name in task_names() if (table := stored_table(results, name)) is not None]
     if not tables:
         raise UserError(f"not measured yet; measure it with: codesign-bench plot {FOLDER} --results {results}")
     return pd.concat(tables, ignore_index=True)
+
+
+def stored_table(results: Path, task_name: str) -> pd.DataFrame | None:
+    """Return the table of one task, or None if there is none."""
+    return read_table(_path(results, task_name))
 
 
 def _path(results: Path, task_name: str) -> Path:

@@ -37,6 +37,8 @@ def normalized_score(returns: ArrayLike, reference: Reference | None) -> np.ndar
     a policy may do worse than an idle tool, and better than anything known when the reference was measured.
     """
     values = np.asarray(returns, dtype=np.float64)
-    known = reference is not None and reference.one > reference.zero
-    scores = (values - reference.zero) / (reference.one - reference.zero) if known else np.full_like(values, np.nan)
+    if reference is None or not reference.one > reference.zero:
+        scores = np.full_like(values, np.nan)
+    else:
+        scores = (values - reference.zero) / (reference.one - reference.zero)
     return float(scores) if values.ndim == 0 else scores

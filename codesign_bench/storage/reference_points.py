@@ -88,5 +88,5 @@ def reference_points_in(frame: pd.DataFrame) -> pd.DataFrame:
 
 def _first(frame: pd.DataFrame, column: str) -> float:
     """Return the first number in a column, NaN where there is none."""
-    known = frame[column].dropna() if column in frame.columns else ()
-    return float(known.iloc[0]) if len(known) else float("nan")
+    known = frame[column].dropna().tolist() if column in frame.columns else []
+    return float(known[0]) if known else float("nan")

@@ -100,6 +100,17 @@ def test_the_best_single_tool_is_the_best_of_those_that_were_tried() -> None:
     assert list(any_tool.sources) == ["tool 0", "tool 1", "tool 2", "tool 3"]
 
 
+def test_tools_that_were_tried_before_choose_the_finalists_and_are_not_played_again() -> None:
+    # The table says that the shortest stick earns most, which is wrong; it is the finalist, and its returns are played.
+    tool, goal = (index.ravel() for index in np.indices((4, 4)))
+    tried = pd.DataFrame({"tool": tool, "goal": goal, "return": -tool})
+    single = by_name(measure(_Scripted(), random_tools=0, finalists=1, tried=tried))["best_single_tool"]
+    assert single.source == "tool 0 by return, tool 0 by success, of 4"
+    assert single.returns == pytest.approx([0.0, -1.5, -3.0, -3.1], abs=1e-6)
+    other = by_name(measure(_Scripted(), random_tools=0, finalists=1, tried=tried[:8]))["best_single_tool"]
+    assert other.source == "tool 2 by return, tool 2 by success, of 4", "a table of other goals does not choose"
+
+
 def test_only_finalists_meet_the_instances_after_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reference_points, "GOALS", 2)
     played: list[int] = []
@@ -111,7 +122,7 @@ def test_only_finalists_meet_the_instances_after_the_first(monkeypatch: pytest.M
 
     monkeypatch.setattr(reference_points, "play_tools", counted)
     single = by_name(measure(_Scripted(), random_tools=4, finalists=1))["best_single_tool"]
-    assert played == [(4 + 2) * 2, 1 * 2]
+    assert played == [(4 + 2) * 2, 1 * 4]
     assert single.returns.shape == (4,)
 
 

@@ -126,7 +126,7 @@ def test_reference_points_are_thin_lines_in_the_panels_of_their_task_and_named_o
         ("mean return", "reference idle", -3.0),
         ("success rate", "reference idle", -0.1),
         ("success rate", "reference best_known", 0.2),
-        ("success rate", "reference idle", pytest.approx(-0.3)),
+        ("success rate", "reference idle", -0.3),
     }
     assert legend(figure) == ["gnn_ppo (n=3)", "idle", "best known"]
     thin = [line for axes in figure.axes for line in axes.lines if str(line.get_gid()).startswith("reference ")]

@@ -27,10 +27,10 @@ SLIVER = 0.05
 """Largest part of a curve's length that counts as too short to see."""
 REFERENCE_WIDTH = 0.7
 """Of a line, in points: about half a curve's."""
-REFERENCE_STYLES: dict[str, tuple[str, str | tuple[float, tuple[float, ...]]]] = {
+REFERENCE_STYLES: dict[str, tuple[str, tuple[float, tuple[float, ...]]]] = {
     "idle": ("#999999", (0.0, (1.0, 2.0))),
     "random_tool": ("#999999", (0.0, (4.0, 2.0))),
-    "script": ("#444444", "-"),
+    "script": ("#444444", (0.0, ())),
     "best_single_tool": ("#444444", (0.0, (5.0, 1.5, 1.0, 1.5))),
     "best_known": ("#444444", (0.0, (1.0, 1.0))),
 }

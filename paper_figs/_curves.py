@@ -13,6 +13,7 @@ from matplotlib.ticker import EngFormatter, MaxNLocator
 from codesign_bench.errors import UserError
 from codesign_bench.figures.comparison import is_compared
 from codesign_bench.storage.frames import default_rows, require_columns
+from codesign_bench.storage.reference_points import POINTS, reference_points_in
 
 from ._order import task_order
 from ._style import BAND_OPACITY, COLUMN_WIDTH, PAGE_WIDTH, Dashes, in_order, line_styles, style
@@ -24,6 +25,16 @@ PANEL_HEIGHT = 1.5
 """Height of a panel, in inches."""
 SLIVER = 0.05
 """Fraction of a curve's length below which a piece is too short to see."""
+REFERENCE_WIDTH = 0.7
+"""Of a line, in points: about half a curve's."""
+REFERENCE_STYLES: dict[str, tuple[str, tuple[float, tuple[float, ...]]]] = {
+    "idle": ("#999999", (0.0, (1.0, 2.0))),
+    "random_tool": ("#999999", (0.0, (4.0, 2.0))),
+    "script": ("#444444", (0.0, ())),
+    "best_single_tool": ("#444444", (0.0, (5.0, 1.5, 1.0, 1.5))),
+    "best_known": ("#444444", (0.0, (1.0, 1.0))),
+}
+"""Colour and dashes of the line of each reference point; light ones need no skill."""
 NEEDED = ("env_steps", "task", "method", "variant", "seed", *QUANTITIES)
 
 
@@ -41,7 +52,15 @@ def evaluated_rows(frame: pd.DataFrame) -> pd.DataFrame:
     return rows
 
 
-def draw_curves(table: pd.DataFrame, labels: dict[str, str], note: str) -> Figure:
+def reference_texts(frame: pd.DataFrame) -> dict[str, str]:
+    """Return the reference points in a frame as the text of a file, by its ending; nothing where there are none."""
+    points = reference_points_in(frame)
+    return {} if points.empty else {"references.csv": points.to_csv(index=False, lineterminator="\n")}
+
+
+def draw_curves(
+    table: pd.DataFrame, labels: dict[str, str], note: str, references: pd.DataFrame | None = None
+) -> Figure:
     """Return for each task a panel of returns above one of success rates, and one legend with seed counts.
 
     Args:
@@ -49,7 +68,9 @@ def draw_curves(table: pd.DataFrame, labels: dict[str, str], note: str) -> Figur
             no interval), seeds (the number that reached this step).
         labels: names of methods in the legend, if they differ from the method's.
         note: explanation of lines and bands.
+        references: levels to draw as thin grey lines, rows of `reference_points_in`; None: none.
     """
+    levels = pd.DataFrame(columns=["task", "point"]) if references is None else references
     styles = line_styles(table["method"])
     tasks = task_order(table["task"])
     columns = min(len(tasks), PANELS_PER_ROW)
@@ -57,7 +78,8 @@ def draw_curves(table: pd.DataFrame, labels: dict[str, str], note: str) -> Figur
     narrow = columns == 1 and not _compares(table)
     width = COLUMN_WIDTH if narrow else PAGE_WIDTH
     with style():
-        figure = Figure(figsize=(width, rows * PANEL_HEIGHT + 0.9), layout="constrained")
+        height = rows * PANEL_HEIGHT + (0.9 if levels.empty else 1.2)
+        figure = Figure(figsize=(width, height), layout="constrained")
         axes = figure.subplots(rows, columns, squeeze=False)
         for position, task in enumerate(tasks):
             block, column = divmod(position, columns)
@@ -65,10 +87,11 @@ def draw_curves(table: pd.DataFrame, labels: dict[str, str], note: str) -> Figur
             for row, quantity in enumerate(QUANTITIES, start=top):
                 curves = table[(table["task"] == task) & (table["quantity"] == quantity)]
                 _draw_panel(axes[row, column], curves, quantity, styles)
+                draw_references(axes[row, column], levels[levels["task"] == task], quantity)
             axes[top, column].set_title(str(task).replace("_", " "))
         for axis in axes.flat:
             axis.set_visible(axis.has_data())
-        _add_legend(figure, table, labels, note, columns=_legend_columns(table, narrow))
+        _add_legend(figure, table, labels, note, columns=_legend_columns(table, narrow), points=set(levels["point"]))
         figure.draw_without_rendering()  # ticks take their settings when first drawn, so within these settings
     return figure
 
@@ -91,6 +114,14 @@ def _draw_panel(axes: Axes, curves: pd.DataFrame, quantity: str, styles: dict[st
     axes.xaxis.set_major_locator(MaxNLocator(5))
     if quantity == "success_rate":
         axes.set_ylim(-0.03, 1.03)
+
+
+def draw_references(axes: Axes, points: pd.DataFrame, quantity: str) -> None:
+    """Draw a thin line across the panel for each reference point of one task, below the curves."""
+    for row in points.to_dict("records"):
+        colour, dashes = REFERENCE_STYLES[str(row["point"])]
+        level, name = float(row[quantity]), f"reference {row['point']}"
+        axes.axhline(level, color=colour, linestyle=dashes, linewidth=REFERENCE_WIDTH, zorder=1.5, gid=name)
 
 
 def draw_curve(axes: Axes, curve: pd.DataFrame, colour: str, dashes: Dashes, gid: str) -> None:
@@ -126,14 +157,20 @@ def _without_slivers(curve: pd.DataFrame) -> pd.DataFrame:
     return curve[(steps >= first) & (steps <= last)]
 
 
-def _add_legend(figure: Figure, table: pd.DataFrame, labels: dict[str, str], note: str, columns: int) -> None:
-    """Put one legend with each method's number of seeds below the panels and the meaning of the bands."""
+def _add_legend(
+    figure: Figure, table: pd.DataFrame, labels: dict[str, str], note: str, columns: int, points: set[str]
+) -> None:
+    """Put one legend below the panels: methods with their numbers of seeds, reference points, what the bands mean."""
     styles = line_styles(table["method"])
     handles = []
     for method in in_order(table["method"]):
         colour, dashes = styles[method]
         label = f"{labels.get(method, method)} (n={_seed_count(table[table['method'] == method])})"
         handles.append(Line2D([], [], color=colour, linestyle=dashes, label=label))
+    for point in (name for name in POINTS if name in points):
+        colour, pattern = REFERENCE_STYLES[point]
+        label = point.replace("_", " ")
+        handles.append(Line2D([], [], color=colour, linestyle=pattern, linewidth=REFERENCE_WIDTH, label=label))
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, title=note, title_fontsize=5.5)
 
 

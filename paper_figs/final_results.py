@@ -1,21 +1,33 @@
 """Final return and success of every method on every task, with intervals over seeds: the benchmark's table (ours).
 
-Numbers are means over seeds of the last evaluation of each; seeds that stopped early are left out. Minutes are the
-median over cells as they ran, in parallel with others. The time of a cell that shared its core says nothing about the
-method.
+Numbers are means over seeds of the last evaluation of each; seeds that stopped early are left out. The normalised
+score is 0 for a random tool held still and 1 for the best known (`docs/reference_points.md`); only this score is
+averaged over tasks. Minutes are the median over cells as they ran, in parallel with others. The time of a cell that
+shared its core says nothing about the method.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from codesign_bench.cell.variant import DEFAULT_NAME
-from codesign_bench.figures.source import curves
-from codesign_bench.stats import CONFIDENCE, MIN_SEEDS, final_rng, final_values, mean_interval
+from codesign_bench.figures.source import curves_with_references
+from codesign_bench.stats import (
+    CONFIDENCE,
+    MIN_SEEDS,
+    bootstrap,
+    final_rng,
+    final_values,
+    mean_interval,
+    normalized_score,
+)
+from codesign_bench.storage.reference_points import reference_points_in, references
 from codesign_bench.text_tables import latex, markdown
 
 from ._curves import PANELS_PER_ROW, QUANTITIES, evaluated_rows, method_labels
@@ -23,7 +35,7 @@ from ._order import task_order
 from ._style import PAGE_WIDTH, in_order, line_styles, style
 
 TITLE = "Final results"
-SOURCE = curves
+SOURCE = curves_with_references
 NEEDS = "codesign-bench run --method all --task T --seeds 6"
 ROW_HEIGHT = 0.17
 """Height of a method in a panel, in inches."""
@@ -32,20 +44,28 @@ INTERVAL = (
 )
 """The kind of interval, written on the figure."""
 DIGITS = 2
+SCORE = "normalized_score"
+AVERAGE = "average"
+"""In the place of a task: the mean over all tasks that have reference points."""
+SAME_BUDGET = 0.02
+"""Largest part of the steps by which methods of one budget differ (ours)."""
 FARTHEST_SHARE = 0.9
 """A seed counts if it has at least this fraction of the most steps of its method (ours)."""
 
 
 def data(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return one row per task and method, the same in every call.
+    """Return one row per task and method, then one per method for the average over tasks, the same in every call.
+
+    The average is over the tasks that have reference points; a method that lacks one of them has none.
 
     Args:
         frame: rows of `codesign_bench.load_results`; variants other than `default` are left out.
 
     Returns:
         Columns task, method, label, seeds, env_steps (mean over seeds), then for each quantity ("return_mean",
-        "success_rate") itself, `<quantity>_low` and `<quantity>_high` (NaN for fewer than three seeds), and minutes
-        (median over seeds).
+        "success_rate", "normalized_score") itself, `<quantity>_low` and `<quantity>_high` (NaN for fewer than three
+        seeds), and minutes (median over seeds). The normalised score is NaN where the task has no reference points,
+        everything else but seeds (the fewest) and steps is NaN in an average.
 
     Raises:
         UserError: a column, or every row of the default variant, is missing.
@@ -53,7 +73,8 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     rows = evaluated_rows(frame)
     labels = method_labels(frame)
     finals = {name: final_values(rows, name) for name in (*QUANTITIES, "wall_s")}
-    result = []
+    scales = references(reference_points_in(rows))
+    result, scores = [], dict[str, dict[str, np.ndarray]]()
     for task in task_order(rows["task"]):
         for method in in_order(rows.loc[rows["task"] == task, "method"]):
             own = {name: _ended(table, task, method) for name, table in finals.items()}
@@ -68,8 +89,20 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
                 values = own[name][name].to_numpy()
                 low, high = mean_interval(values, final_rng(task, method, DEFAULT_NAME, name))
                 row |= {name: float(values.mean()), f"{name}_low": low, f"{name}_high": high}
+            # The score is linear in the return, and so are the ends of its interval.
+            for end in ("", "_low", "_high"):
+                row[SCORE + end] = normalized_score(float(str(row[f"return_mean{end}"])), scales.get(task))
+            if task in scales:
+                earned = own["return_mean"]["return_mean"].to_numpy()
+                scores.setdefault(method, {})[task] = np.asarray(normalized_score(earned, scales[task]))
             result.append({**row, "minutes": float(own["wall_s"]["wall_s"].median()) / 60.0})
-    return pd.DataFrame(result)
+    table = pd.DataFrame(result)
+    return pd.concat([table, *_averages(table, scores)], ignore_index=True)
+
+
+def per_task(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of `data` without the averages."""
+    return table[table["task"] != AVERAGE]
 
 
 def draw(frame: pd.DataFrame) -> Figure:
@@ -78,7 +111,7 @@ def draw(frame: pd.DataFrame) -> Figure:
     Raises:
         UserError: as `data` does.
     """
-    table = data(frame)
+    table = per_task(data(frame))
     tasks = task_order(table["task"])
     columns = min(len(tasks), PANELS_PER_ROW)
     rows = math.ceil(len(tasks) / columns)
@@ -101,29 +134,37 @@ def texts(frame: pd.DataFrame) -> dict[str, str]:
     Raises:
         UserError: as `data` does.
     """
-    header = ["task", "method", "seeds", "steps", "return", "success", "minutes a cell"]
+    table = data(frame)
+    scored = table[SCORE].notna().any()
+    header = ["task", "method", "seeds", "steps", "return", "success", "normalised score", "minutes a cell"]
+    count = per_task(table.dropna(subset=[SCORE]))["task"].nunique()
     rows = [
         [
-            str(row["task"]).replace("_", " "),
+            f"average of {count} tasks" if row["task"] == AVERAGE else str(row["task"]).replace("_", " "),
             str(row["label"]),
             str(row["seeds"]),
             f"{row['env_steps']:,.0f}",
-            *(_with_interval(row, name) for name in QUANTITIES),
-            f"{row['minutes']:.1f}",
+            *(_with_interval(row, name) for name in (*QUANTITIES, SCORE)),
+            "-" if math.isnan(row["minutes"]) else f"{row['minutes']:.1f}",
         ]
-        for row in data(frame).to_dict("records")
+        for row in table.to_dict("records")
     ]
+    if not scored:
+        unknown = header.index("normalised score")
+        header, *rows = ([*line[:unknown], *line[unknown + 1 :]] for line in (header, *rows))
     return {"md": markdown(header, rows), "tex": latex(header, rows)}
 
 
 def success_by_task(table: pd.DataFrame) -> str:
     """Return the success rates of `data` as a Markdown table, tasks in rows and methods in columns."""
+    table = per_task(table)
     methods = in_order(table["method"])
     by_cell = {(row["task"], row["method"]): row for row in table.to_dict("records")}
     rows = [
         [
             str(task).replace("_", " "),
             _range(table.loc[table["task"] == task, "seeds"]),
+            _steps(table.loc[table["task"] == task, "env_steps"]),
             *(
                 _with_interval(by_cell[task, name], "success_rate") if (task, name) in by_cell else "-"
                 for name in methods
@@ -131,7 +172,49 @@ def success_by_task(table: pd.DataFrame) -> str:
         ]
         for task in task_order(table["task"])
     ]
-    return markdown(["task", "seeds", *(f"`{name}`" for name in methods)], rows)
+    return markdown(["task", "seeds", "steps", *(f"`{name}`" for name in methods)], rows)
+
+
+def _averages(table: pd.DataFrame, scores: Mapping[str, Mapping[str, np.ndarray]]) -> list[pd.DataFrame]:
+    """Return the rows of the averages over tasks.
+
+    Args:
+        table: the rows of every task.
+        scores: method -> task -> normalised scores of its seeds, for tasks that have any.
+    """
+    tasks = {task for of_method in scores.values() for task in of_method}
+    rows = []
+    for method in in_order(scores) if len(tasks) > 1 else ():
+        if set(scores[method]) != tasks:
+            continue
+        own = table[(table["method"] == method) & table["task"].isin(tasks)]
+        seeds = list(scores[method].values())
+        low, high = bootstrap(seeds, _mean_of_means, final_rng(AVERAGE, method, DEFAULT_NAME, SCORE))
+        rows.append(
+            {
+                "task": AVERAGE,
+                "method": method,
+                "label": own["label"].iloc[0],
+                "seeds": own["seeds"].min(),
+                "env_steps": own["env_steps"].mean(),
+                SCORE: own[SCORE].mean(),
+                f"{SCORE}_low": float(low),
+                f"{SCORE}_high": float(high),
+            }
+        )
+    return [pd.DataFrame(rows)] if rows else []
+
+
+def _mean_of_means(*tasks: np.ndarray) -> np.ndarray:
+    """Return (R,) means over tasks of the means over seeds of (R, N) resampled scores each."""
+    return np.mean([sample.mean(axis=1) for sample in tasks], axis=0)
+
+
+def _steps(values: pd.Series[float]) -> str:
+    """Return steps in thousands: the mean over methods, or lowest and highest where their budgets differ."""
+    same = values.max() - values.min() <= SAME_BUDGET * values.max()
+    shown = (values.mean(),) if same else (values.min(), values.max())
+    return "-".join(f"{value / 1e3:,.0f}k" for value in shown)
 
 
 def _range(values: pd.Series[int]) -> str:
@@ -159,5 +242,7 @@ def _draw_panel(axes: Axes, table: pd.DataFrame, title: str) -> None:
 
 def _with_interval(row: dict[object, object], name: str) -> str:
     centre, low, high = (float(str(row[key])) for key in (name, f"{name}_low", f"{name}_high"))
+    if math.isnan(centre):
+        return "-"
     interval = "" if math.isnan(low) else f" [{low:.{DIGITS}f}, {high:.{DIGITS}f}]"
     return f"{centre:.{DIGITS}f}{interval}"

@@ -1,7 +1,8 @@
 """Learning curves of every method on every task (the paper's figure `fig:sample_efficiency`).
 
 The paper's claim: "Across all tasks, our framework achieves improved performance and sample efficiency." Lines are
-means over seeds and bands the standard error, as in the paper; the success rates below are ours.
+means over seeds and bands the standard error, as in the paper; the success rates below are ours. Grey lines are
+reference points, which need no learning: see `docs/reference_points.md`.
 """
 
 from __future__ import annotations
@@ -9,13 +10,14 @@ from __future__ import annotations
 import pandas as pd
 from matplotlib.figure import Figure
 
-from codesign_bench.figures.source import curves
+from codesign_bench.figures.source import curves_with_references
 from codesign_bench.stats import MIN_SEEDS, curve_statistics
+from codesign_bench.storage.reference_points import reference_points_in
 
-from ._curves import QUANTITIES, draw_curves, evaluated_rows, method_labels
+from ._curves import QUANTITIES, draw_curves, evaluated_rows, method_labels, reference_texts
 
 TITLE = "Learning curves"
-SOURCE = curves
+SOURCE = curves_with_references
 NEEDS = "codesign-bench run --method all --task T --seeds 6"
 COMPARES = True
 """Whether `plot --compare` adds the curves of other results."""
@@ -56,4 +58,18 @@ def draw(frame: pd.DataFrame) -> Figure:
     """
     table = data(frame)
     low, high = table["mean"] - table["standard_error"], table["mean"] + table["standard_error"]
-    return draw_curves(table.assign(centre=table["mean"], low=low, high=high), method_labels(frame), INTERVAL)
+    return draw_curves(
+        table.assign(centre=table["mean"], low=low, high=high),
+        method_labels(frame),
+        INTERVAL,
+        reference_points_in(evaluated_rows(frame)),
+    )
+
+
+def texts(frame: pd.DataFrame) -> dict[str, str]:
+    """Return the values of the grey lines as a further CSV file, if the results have any.
+
+    Raises:
+        UserError: as `data` does.
+    """
+    return reference_texts(evaluated_rows(frame))

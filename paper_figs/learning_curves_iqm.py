@@ -8,14 +8,15 @@ from __future__ import annotations
 import pandas as pd
 from matplotlib.figure import Figure
 
-from codesign_bench.figures.source import curves
+from codesign_bench.figures.source import curves_with_references
 from codesign_bench.seeding import generator
 from codesign_bench.stats import CONFIDENCE, MIN_SEEDS, curve_intervals
+from codesign_bench.storage.reference_points import reference_points_in
 
-from ._curves import QUANTITIES, draw_curves, evaluated_rows, method_labels
+from ._curves import QUANTITIES, draw_curves, evaluated_rows, method_labels, reference_texts
 
 TITLE = "Learning curves, interquartile mean"
-SOURCE = curves
+SOURCE = curves_with_references
 NEEDS = "codesign-bench run --method all --task T --seeds 6"
 COMPARES = True
 """Whether `plot --compare` adds the curves of other results."""
@@ -56,4 +57,13 @@ def draw(frame: pd.DataFrame) -> Figure:
         UserError: as `data` does.
     """
     table = data(frame).rename(columns={"interquartile_mean": "centre"})
-    return draw_curves(table, method_labels(frame), INTERVAL)
+    return draw_curves(table, method_labels(frame), INTERVAL, reference_points_in(evaluated_rows(frame)))
+
+
+def texts(frame: pd.DataFrame) -> dict[str, str]:
+    """Return the values of the grey lines as a further CSV file, if the results have any.
+
+    Raises:
+        UserError: as `data` does.
+    """
+    return reference_texts(evaluated_rows(frame))

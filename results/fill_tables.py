@@ -13,27 +13,73 @@ from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
-import codesign_bench as cb
+import pandas as pd
+
 from codesign_bench.claims.evidence import load_evidence
 from codesign_bench.claims.verify import Row, by_rule, contradicted, judge
-from codesign_bench.registry import load_module
+from codesign_bench.figures.source import Request, curves_with_references
+from codesign_bench.registry import in_order, load_module
+from codesign_bench.storage.reference_points import POINTS, load_reference_points
 from codesign_bench.study import DEFAULT_STUDY, load_study
+from codesign_bench.text_tables import markdown
 
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "results" / "reference"
 LONGER = ROOT / "results" / "longer"
-PAGES = {ROOT / "README.md": REFERENCE, REFERENCE / "README.md": REFERENCE, LONGER / "README.md": LONGER}
+PAGES = {
+    ROOT / "README.md": REFERENCE,
+    ROOT / "docs" / "reference_points.md": REFERENCE,
+    REFERENCE / "README.md": REFERENCE,
+    LONGER / "README.md": LONGER,
+}
 """Every page and the results that its tables show."""
+PAPERS_METHOD = "gnn_ppo"
 TABLE = re.compile(r"(<!-- (?P<name>\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def _final_results(results: Path) -> str:
-    return load_module("paper_figs", "final_results").texts(cb.load_results(results))["md"]
+    return load_module("paper_figs", "final_results").texts(_curves(results))["md"]
 
 
 def _success(results: Path) -> str:
     final = load_module("paper_figs", "final_results")
-    return final.success_by_task(final.data(cb.load_results(results)))
+    return final.success_by_task(final.data(_curves(results)))
+
+
+@lru_cache
+def _curves(results: Path) -> pd.DataFrame:
+    return curves_with_references(Request(results))
+
+
+def _reference_points(results: Path) -> str:
+    """Return mean return and success of every point and task, in one cell of the table each."""
+    rows = load_reference_points(results).to_dict("records")
+    told = {(row["task"], row["point"]): f"{row['return_mean']:.2f} ({row['success_rate']:.2f})" for row in rows}
+    header = ["task", *(point.replace("_", " ") for point in POINTS)]
+    tasks = in_order("tasks", [task for task, _ in told])
+    lines = [[task.replace("_", " "), *(told.get((task, point), "-") for point in POINTS)] for task in tasks]
+    return markdown(header, lines)
+
+
+def _script(results: Path) -> str:
+    """Return in a sentence on which tasks the hand-written script solves more than the paper's method."""
+    final = load_module("paper_figs", "final_results")
+    table = final.per_task(final.data(_curves(results)))
+    learned = table[table["method"] == PAPERS_METHOD].set_index("task")["success_rate"]
+    points = load_reference_points(results)
+    scripted = points[points["point"] == "script"].set_index("task")["success_rate"]
+    tasks = in_order("tasks", set(learned.index) & set(scripted.index))
+    ahead = [task for task in tasks if scripted[task] > learned[task]]
+    behind = [task for task in tasks if task not in ahead]
+    ours, theirs = (", ".join(_both(task, scripted, learned) for task in group) for group in (ahead, behind))
+    others = f", and no more on the others ({theirs})" if behind else ""
+    counted = f"{len(ahead)} of {len(tasks)} tasks ({ours})"
+    return f"A script written by hand solves more instances than `{PAPERS_METHOD}` on {counted}{others}.\n"
+
+
+def _both(task: str, scripted: pd.Series[float], learned: pd.Series[float]) -> str:
+    """Return a task with both of its success rates."""
+    return f"{task.replace('_', ' ')} {scripted[task]:.2f} to {learned[task]:.2f}"
 
 
 @lru_cache
@@ -45,6 +91,8 @@ def _judged(results: Path) -> list[Row]:
 MAKERS: dict[str, Callable[[Path], str]] = {
     "final_results": _final_results,
     "success": _success,
+    "reference_points": _reference_points,
+    "script": _script,
     "claims": lambda results: by_rule(_judged(results)),
     "contradicted": lambda results: contradicted(_judged(results)),
 }

@@ -22,6 +22,7 @@ from codesign_bench.evaluation.sensitivity import load_sensitivity
 from codesign_bench.stats import CELL_KEYS, MIN_SEEDS
 from codesign_bench.storage.cells import reported_cells
 from codesign_bench.storage.frames import load_evaluations, load_results
+from codesign_bench.storage.reference_points import load_reference_points
 from codesign_bench.task import load_task, task_names
 
 DESIGN_PREFIX = "design_"
@@ -45,6 +46,8 @@ class Evidence:
     """Task -> column of a design parameter in `evaluations` -> width of its range, in the parameter's unit."""
     profile: str = DEFAULT_PROFILE
     """The profile of the cells, if it is the same for all, so that commands for missing data match them."""
+    references: pd.DataFrame = field(default_factory=pd.DataFrame)
+    """Rows of `codesign_bench.storage.reference_points.load_reference_points`."""
 
     @property
     def tasks(self) -> set[str]:
@@ -116,10 +119,12 @@ def load_evidence(results: Path) -> Evidence:
     sensitivity = _read(load_sensitivity, results, ("tool", "goal", "success"))
     outside = _read(load_outside, results, ("task", "method", "seed", "instance", "success"))
     deployment = _read(load_deployment, results, ("task", "kind", "tool", "row", "column", "success"))
+    references = _read(load_reference_points, results, ("task", "point", "return_mean", "success_rate"))
     if evaluations.empty and sensitivity.empty:
         raise UserError(f"no finished cell in '{results}' yet; create some with: codesign-bench run --out {results}")
     profile = profiles.pop() if len(profiles) == 1 else DEFAULT_PROFILE
-    return Evidence(curves, evaluations, sensitivity, outside, deployment, _design_widths(evaluations), profile)
+    widths = _design_widths(evaluations)
+    return Evidence(curves, evaluations, sensitivity, outside, deployment, widths, profile, references)
 
 
 def _read(read: Callable[[Path], pd.DataFrame], results: Path, needed: Sequence[str]) -> pd.DataFrame:

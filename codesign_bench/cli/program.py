@@ -26,6 +26,7 @@ COMMANDS = (
     "verify",
     "report",
     "reproduce",
+    "reference",
     "render",
     "deploy",
     "export",

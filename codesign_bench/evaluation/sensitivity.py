@@ -3,7 +3,7 @@
 A task's script controls every tool on every goal, without learning. If the design matters, tools differ widely and no
 tool solves every goal. The tables are next to the cells, one per task, and are measured once.
 
-Shapes: `K` tools, `G` goals (evaluation instances), `D` design.
+Shapes: `K` tools, `G` goals (evaluation instances), `B` episodes, `I` instance, `D` design.
 """
 
 from __future__ import annotations
@@ -64,9 +64,7 @@ def measure(name: str, random_tools: int = RANDOM_TOOLS, goals: int = GOALS, job
     instances = task.evaluation_instances()[:goals]
     designs = tools_of(task, instances, random_tools)
     tool, goal = (index.ravel() for index in np.indices((len(designs), len(instances))))
-    parts = np.array_split(np.arange(len(tool)), -(-len(tool) // min(EPISODES_AT_ONCE, task.max_slots)))
-    results = Parallel(n_jobs=jobs)(delayed(_play)(name, designs[tool[part]], instances[goal[part]]) for part in parts)
-    outcome, returns, success = (np.concatenate(values) for values in zip(*results, strict=True))
+    outcome, returns, success = play_tools(task, designs[tool], instances[goal], jobs)
     return pd.DataFrame(
         {
             "task": name,
@@ -82,6 +80,24 @@ def measure(name: str, random_tools: int = RANDOM_TOOLS, goals: int = GOALS, job
         },
         columns=list(COLUMNS),
     )
+
+
+def play_tools(task: Task, designs: Floats, instances: Floats, jobs: int = 1) -> tuple[Floats, Floats, Floats]:
+    """Return outcome, return and success, each (B,), of one episode per row under the script's controller.
+
+    Args:
+        task: has a script.
+        designs: (B, D) normalised.
+        instances: (B, I) in the instance space's units.
+        jobs: processes that play side by side; the numbers do not depend on it.
+
+    Raises:
+        UserError: the task has no script.
+    """
+    parts = np.array_split(np.arange(len(designs)), -(-len(designs) // min(EPISODES_AT_ONCE, task.max_slots)))
+    results = Parallel(n_jobs=jobs)(delayed(_play)(task, designs[part], instances[part]) for part in parts)
+    outcome, returns, success = (np.concatenate(values) for values in zip(*results, strict=True))
+    return outcome, returns, success
 
 
 def measure_missing(results: Path, tasks: Iterable[str], log: Log) -> None:
@@ -111,18 +127,22 @@ def load_sensitivity(results: Path) -> pd.DataFrame:
     """
     import pandas as pd
 
-    tables = [table for name in task_names() if (table := read_table(_path(results, name))) is not None]
+    tables = [table for name in task_names() if (table := stored_table(results, name)) is not None]
     if not tables:
         raise UserError(f"not measured yet; measure it with: codesign-bench plot {FOLDER} --results {results}")
     return pd.concat(tables, ignore_index=True)
+
+
+def stored_table(results: Path, task_name: str) -> pd.DataFrame | None:
+    """Return the table of one task, or None if there is none."""
+    return read_table(_path(results, task_name))
 
 
 def _path(results: Path, task_name: str) -> Path:
     return results / FOLDER / f"{task_name}.csv"
 
 
-def _play(name: str, designs: Floats, instances: Floats) -> tuple[Floats, Floats, Floats]:
+def _play(task: Task, designs: Floats, instances: Floats) -> tuple[Floats, Floats, Floats]:
     """Return outcome, return and success of one episode per row."""
-    task = load_task(name)
     evaluation = evaluate(task, GivenDesigns(designs, task.script()), instances=instances)
     return evaluation.outcomes, evaluation.returns, evaluation.successes.astype(np.float64)

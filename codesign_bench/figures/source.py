@@ -14,6 +14,7 @@ from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import reported_cells
 from codesign_bench.storage.frames import load_evaluations, load_results
+from codesign_bench.storage.reference_points import with_reference_points
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,6 +39,14 @@ Source: TypeAlias = "Callable[[Request], pd.DataFrame]"
 def curves(request: Request) -> pd.DataFrame:
     """Return the learning curves of all cells, as `codesign_bench.load_results` does."""
     return load_results(request.results)
+
+
+def curves_with_references(request: Request) -> pd.DataFrame:
+    """Return the learning curves of all cells, with the reference points of their tasks in columns if there are any.
+
+    `reference_points_in` reads the points.
+    """
+    return with_reference_points(load_results(request.results), request.results)
 
 
 def evaluations(request: Request) -> pd.DataFrame:

@@ -16,6 +16,7 @@ from codesign_bench.stats.improvement import (
     probability_of_improvement,
     probability_of_improvement_interval,
 )
+from codesign_bench.stats.normalization import Reference, normalized_score
 from codesign_bench.stats.summaries import MIN_SEEDS, interquartile_mean, mean, standard_error
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "CONFIDENCE",
     "MIN_SEEDS",
     "RESAMPLES",
+    "Reference",
     "bootstrap",
     "bootstrap_interval",
     "curve_intervals",
@@ -33,6 +35,7 @@ __all__ = [
     "mean",
     "mean_difference_interval",
     "mean_interval",
+    "normalized_score",
     "on_common_grid",
     "performance_profile",
     "performance_profile_interval",

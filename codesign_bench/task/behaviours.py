@@ -1,4 +1,4 @@
-"""Behaviours without training: fixed designs, random tools and controls, and an idle tool.
+"""Behaviours without training: fixed designs, random tools and controls, an idle tool, and two behaviours joined.
 
 Shapes: `B` batch, `O` observation, `D` design, `C` control.
 """
@@ -41,6 +41,21 @@ class Idle(Behaviour):
     def act(self, observation: Singles) -> Singles:
         """Return (B, C) zeros."""
         return np.zeros((*np.shape(observation)[:-1], self.sizes[1]), dtype=np.float32)
+
+
+class Joined(Behaviour):
+    """The designer of one behaviour with the controller of another."""
+
+    def __init__(self, designer: Behaviour, controller: Behaviour) -> None:
+        self.designer, self.controller = designer, controller
+
+    def design(self, observation: Singles) -> Singles:
+        """Return the designer's designs."""
+        return self.designer.design(observation)
+
+    def act(self, observation: Singles) -> Singles:
+        """Return the controller's controls."""
+        return self.controller.act(observation)
 
 
 class RandomBehaviour(Behaviour):

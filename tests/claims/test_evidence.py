@@ -47,6 +47,14 @@ def test_unfinished_and_failed_cells_do_not_count(tmp_path: Path) -> None:
     assert load_evidence(tmp_path).final_returns("push", "gnn_ppo").tolist() == [2.0, 2.0, 2.0]
 
 
+def test_reference_points_are_read_where_there_are_any(tmp_path: Path) -> None:
+    make_results(tmp_path)
+    assert load_evidence(tmp_path).references.empty
+    row = {"task": ["push"], "point": ["idle"], "return_mean": [-1.5], "success_rate": [0.0]}
+    pd.DataFrame(row).to_csv(tmp_path / "reference_points.csv", index=False)
+    assert load_evidence(tmp_path).references.to_dict("list") == row
+
+
 def test_final_returns_are_one_mean_per_seed_over_its_instances() -> None:
     evaluations = pd.concat([finals(OURS, (1.0, 2.0, 3.0)), finals(OURS, (3.0, 2.0, 4.0)), finals(OTHER, (9.0,) * 3)])
     evidence = Evidence(evaluations=evaluations)

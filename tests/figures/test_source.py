@@ -12,6 +12,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.figures.source import (
     Request,
     curves,
+    curves_with_references,
     design_sensitivity,
     evaluations,
     tasks_in,
@@ -19,6 +20,7 @@ from codesign_bench.figures.source import (
     trials_on_an_arm,
 )
 from codesign_bench.storage.records import RUNNING
+from codesign_bench.storage.reference_points import FILE, reference_points_in
 
 
 def test_curves_are_those_of_all_cells_and_evaluations_those_of_finished_ones(tmp_path: Path) -> None:
@@ -26,6 +28,15 @@ def test_curves_are_those_of_all_cells_and_evaluations_those_of_finished_ones(tm
     store_cell(tmp_path, seed=1, status=RUNNING, curve=rising(0.0, 5.0), evaluation=[{"return": 9.0}])
     assert curves(Request(tmp_path))["return_mean"].tolist() == [0.0, 1.0, 0.0, 5.0]
     assert evaluations(Request(tmp_path))["return"].tolist() == [1.0, 3.0]
+
+
+def test_curves_come_with_the_reference_points_that_the_folder_has(tmp_path: Path) -> None:
+    store_cell(tmp_path, curve=rising(0.0, 1.0))
+    pd.testing.assert_frame_equal(curves_with_references(Request(tmp_path)), curves(Request(tmp_path)))
+    row = {"task": ["push"], "point": ["script"], "return_mean": [1.5], "success_rate": [0.5]}
+    pd.DataFrame(row).to_csv(tmp_path / FILE, index=False)
+    found = reference_points_in(curves_with_references(Request(tmp_path)))
+    assert found.to_dict("list") == row
 
 
 def test_tasks_are_those_of_the_cells_each_once(tmp_path: Path) -> None:
@@ -56,7 +67,9 @@ def test_what_was_measured_is_read_and_nothing_is_measured_for_a_figure_that_nob
     assert design_sensitivity(Request(tmp_path))["return"].tolist() == [2.0]
 
 
-@pytest.mark.parametrize("source", [curves, evaluations, design_sensitivity, timing, trials_on_an_arm])
+@pytest.mark.parametrize(
+    "source", [curves, curves_with_references, evaluations, design_sensitivity, timing, trials_on_an_arm]
+)
 def test_a_source_without_data_says_how_to_make_some(source: object, tmp_path: Path) -> None:
     assert callable(source)
     with pytest.raises(UserError, match="codesign-bench "):

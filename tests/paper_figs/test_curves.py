@@ -12,7 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from codesign_bench.errors import UserError
-from codesign_bench.paper_figs._curves import QUANTITIES, draw_curve, draw_curves, evaluated_rows, method_labels
+from codesign_bench.paper_figs._curves import (
+    QUANTITIES,
+    REFERENCE_STYLES,
+    draw_curve,
+    draw_curves,
+    evaluated_rows,
+    method_labels,
+    reference_texts,
+)
+from codesign_bench.storage.reference_points import POINTS
 
 STEPS = (0, 1000, 2000)
 
@@ -93,6 +102,48 @@ def test_every_task_has_a_panel_of_returns_above_one_of_success_rates() -> None:
     )
     assert above.get_position().y0 > below.get_position().y1
     assert len(shown) == 8
+
+
+def levels(task: str, **returns: float) -> pd.DataFrame:
+    """Return reference points of a task; success is a tenth of the return."""
+    rows = [{"point": name, "return_mean": value, "success_rate": value / 10.0} for name, value in returns.items()]
+    return pd.DataFrame(rows).assign(task=task)
+
+
+def test_reference_points_are_thin_lines_in_the_panels_of_their_task_and_named_once() -> None:
+    table = pd.concat([both("push", "gnn_ppo"), both("scoop", "gnn_ppo")])
+    points = pd.concat([levels("push", idle=-1.0, best_known=2.0), levels("scoop", idle=-3.0)])
+    figure = draw_curves(table, {}, "", points)
+    drawn = {
+        (axes.get_ylabel(), line.get_gid(), line.get_ydata()[0])
+        for axes in figure.axes
+        for line in axes.lines
+        if str(line.get_gid()).startswith("reference ")
+    }
+    assert drawn == {
+        ("mean return", "reference idle", -1.0),
+        ("mean return", "reference best_known", 2.0),
+        ("mean return", "reference idle", -3.0),
+        ("success rate", "reference idle", -0.1),
+        ("success rate", "reference best_known", 0.2),
+        ("success rate", "reference idle", -0.3),
+    }
+    assert legend(figure) == ["gnn_ppo (n=3)", "idle", "best known"]
+    thin = [line for axes in figure.axes for line in axes.lines if str(line.get_gid()).startswith("reference ")]
+    thick = [line for axes in figure.axes for line in axes.lines if line.get_gid() == "gnn_ppo"]
+    assert max(line.get_linewidth() for line in thin) < min(line.get_linewidth() for line in thick)
+
+
+def test_without_reference_points_a_figure_says_nothing_of_them() -> None:
+    assert legend(draw_curves(both("push", "gnn_ppo"), {}, "", levels("push").reindex(columns=["task", "point"]))) == [
+        "gnn_ppo (n=3)"
+    ]
+    assert reference_texts(both("push", "gnn_ppo")) == {}
+
+
+def test_every_reference_point_has_a_line_of_its_own() -> None:
+    assert tuple(REFERENCE_STYLES) == POINTS
+    assert len(set(REFERENCE_STYLES.values())) == len(POINTS)
 
 
 def test_the_legend_counts_seeds_in_the_order_of_methods() -> None:

@@ -92,6 +92,58 @@ def test_the_same_results_give_the_same_intervals() -> None:
     pd.testing.assert_frame_equal(figure.data(frame), figure.data(frame))
 
 
+def referenced(frame: pd.DataFrame, idle: float, best_known: float) -> pd.DataFrame:
+    """Return a task's cells with the two ends of its scale."""
+    columns = {"reference_idle_return_mean": idle, "reference_best_known_return_mean": best_known}
+    return frame.assign(**columns, reference_idle_success_rate=0.0, reference_best_known_success_rate=1.0)
+
+
+def test_a_normalised_score_is_0_for_idling_and_1_for_the_best_known() -> None:
+    (row,) = figure.data(referenced(cells("gnn_ppo", [1.0, 2.0, 6.0]), -1.0, 7.0)).to_dict("records")
+    assert row["normalized_score"] == pytest.approx((3.0 + 1.0) / 8.0)
+    assert row["normalized_score_low"] == pytest.approx((row["return_mean_low"] + 1.0) / 8.0)
+    assert row["normalized_score_high"] == pytest.approx((row["return_mean_high"] + 1.0) / 8.0)
+
+
+def test_without_reference_points_there_is_no_score() -> None:
+    frame = pd.concat([cells("gnn_ppo", [1.0] * 3), cells("gnn_ppo", [1.0] * 3, task="scoop")])
+    table = figure.data(frame)
+    assert table["normalized_score"].isna().all()
+    assert table["task"].tolist() == ["push", "scoop"]
+    assert "normalised" not in figure.texts(frame)["md"]
+
+
+def test_normalised_scores_alone_are_averaged_over_the_tasks_that_have_them() -> None:
+    frame = pd.concat(
+        [
+            referenced(cells("gnn_ppo", [1.0] * 3), 0.0, 2.0),
+            referenced(cells("gnn_ppo", [30.0] * 4, task="scoop"), 20.0, 30.0),
+            cells("gnn_ppo", [9.0] * 3, task="lift_cup"),
+            referenced(cells("cma_rl", [2.0] * 3), 0.0, 2.0),
+        ]
+    )
+    table = figure.data(frame)
+    (row,) = table[table["task"] == "average"].to_dict("records")
+    assert row["method"] == "gnn_ppo", "cma_rl has no result on scoop"
+    assert (row["normalized_score"], row["normalized_score_low"], row["normalized_score_high"]) == (0.75, 0.75, 0.75)
+    assert (row["seeds"], row["env_steps"]) == (3, 1000.0)
+    assert np.isnan(row["return_mean"])
+    assert np.isnan(row["success_rate"])
+    text = figure.texts(frame)["md"]
+    assert "| average of 2 tasks | gnn_ppo | 3 | 1,000 | - | - | 0.75 [0.75, 0.75] | - |" in text
+    assert "| lift cup | gnn_ppo | 3 | 1,000 | 9.00 [9.00, 9.00] | 0.90 [0.90, 0.90] | - | 30.0 |" in text
+    shown = {axes.get_title() for axes in figure.draw(frame).axes if axes.get_visible()}
+    assert shown == {"push", "scoop", "lift cup"}
+
+
+def test_the_table_of_success_has_the_steps_spent() -> None:
+    frame = pd.concat([cells("gnn_ppo", [1.0] * 3), cells("cma_rl", [2.0] * 3)])
+    told = "| push | 3 | {} | 0.10 [0.10, 0.10] | 0.20 [0.20, 0.20] |"
+    assert told.format("1k") in figure.success_by_task(figure.data(frame))
+    frame.loc[frame["method"] == "cma_rl", "env_steps"] *= 2
+    assert told.format("1k-2k") in figure.success_by_task(figure.data(frame))
+
+
 def test_without_curves_the_way_to_them_is_told() -> None:
     with pytest.raises(UserError, match="no evaluated cell"):
         figure.data(cells("gnn_ppo", [1.0], variant="alpha-0.30"))

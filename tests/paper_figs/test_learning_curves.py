@@ -148,6 +148,18 @@ def test_results_without_a_default_cell_say_so() -> None:
         learning_curves.draw(frame.iloc[:0])
 
 
+def test_reference_points_of_the_results_are_lines_and_a_file() -> None:
+    frame = three_seeds("push", "gnn_ppo").assign(reference_script_return_mean=0.9, reference_script_success_rate=0.7)
+    figure = learning_curves.draw(frame)
+    (found,) = (line for line in panel(figure, "push").lines if line.get_gid() == "reference script")
+    assert found.get_ydata() == pytest.approx([0.9, 0.9])
+    assert legend(figure) == ["gnn_ppo (n=3)", "script"]
+    assert learning_curves.texts(frame) == {
+        "references.csv": "task,point,return_mean,success_rate\npush,script,0.9,0.7\n"
+    }
+    assert learning_curves.texts(three_seeds("push", "gnn_ppo")) == {}
+
+
 def test_the_figure_can_be_saved(tmp_path: Path) -> None:
     figure = learning_curves.draw(three_seeds("push", "gnn_ppo"))
     for kind in ("png", "pdf"):

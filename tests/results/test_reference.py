@@ -24,6 +24,7 @@ from codesign_bench.deployment.tables import load_deployment
 from codesign_bench.storage.cells import StoredCell, find_cells
 from codesign_bench.storage.layout import EVALUATION_FILE, POLICY_FILE
 from codesign_bench.storage.policies import misfit, policy_and_task
+from codesign_bench.storage.reference_points import BEST_KNOWN, INSTANCES_FILE, load_reference_points
 from codesign_bench.task import load_task
 from played_alike import assert_plays_as_stored
 
@@ -89,6 +90,17 @@ def test_the_shipped_figures_show_the_shipped_cells(tmp_path: Path) -> None:
     for name in names:
         made, shipped = (pd.read_csv(folder / f"{name}.csv") for folder in (tmp_path, REFERENCE / "figures"))
         pd.testing.assert_frame_equal(made, shipped, obj=name)
+
+
+def test_nothing_is_above_the_best_known() -> None:
+    points, instances = load_reference_points(REFERENCE), pd.read_csv(REFERENCE / INSTANCES_FILE)
+    for task, rows in points.groupby("task"):
+        best = rows[rows["point"] == BEST_KNOWN].iloc[0]
+        assert (rows[["return_mean", "success_rate"]] <= best[["return_mean", "success_rate"]]).all(axis=None), task
+        assert (instances["task"] == task).sum() == rows["instances"].sum()
+    means = instances.groupby(["task", "point"])[["return", "success"]].mean().to_numpy()
+    told = points.set_index(["task", "point"]).sort_index()[["return_mean", "success_rate"]].to_numpy()
+    assert means == pytest.approx(told)
 
 
 def test_the_folder_stays_small() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from codesign_bench.task import Task, load_task
-from codesign_bench.task.behaviours import GivenDesigns, Idle, RandomBehaviour
+from codesign_bench.task.behaviours import GivenDesigns, Idle, Joined, RandomBehaviour
 
 
 @pytest.fixture
@@ -32,6 +32,12 @@ def test_the_controller_acts_whatever_the_designs(task: Task) -> None:
     behaviour = GivenDesigns(np.array([0.3]), RandomBehaviour(task, np.random.default_rng(0)))
     expected = RandomBehaviour(task, np.random.default_rng(0))
     np.testing.assert_array_equal(behaviour.act(seen(task, 4)), expected.act(seen(task, 4)))
+
+
+def test_joined_behaviours_design_as_the_one_and_act_as_the_other(task: Task) -> None:
+    joined = Joined(GivenDesigns(np.array([0.3]), RandomBehaviour(task, np.random.default_rng(0))), Idle(task))
+    np.testing.assert_allclose(joined.design(seen(task, 2)), [[0.3]] * 2)
+    assert joined.act(seen(task, 2)).tolist() == [[0.0], [0.0]]
 
 
 def test_idle_is_the_middle_of_both_spaces(task: Task) -> None:

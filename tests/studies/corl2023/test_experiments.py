@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -15,6 +16,7 @@ from codesign_bench.studies.corl2023 import experiments
 from codesign_bench.studies.corl2023.experiments import EXPERIMENTS
 from codesign_bench.studies.corl2023.members import METHODS, TASKS
 from codesign_bench.studies.corl2023.protocol import PROTOCOL
+from codesign_bench.storage.records import CellRecord
 from codesign_bench.study import stages_of
 from codesign_bench.task import load_task
 
@@ -48,6 +50,9 @@ def test_the_trials_on_an_arm_are_played_once(tmp_path: Path, monkeypatch: pytes
     cell = Path("lift_cup/gnn_ppo/default/seed-00")
     monkeypatch.setattr(experiments, "ON_AN_ARM", ("lift_cup",))
     shutil.copytree(VERSION_0_1_0 / cell, tmp_path / cell)
+    record = CellRecord.read(tmp_path / cell)
+    assert record is not None
+    replace(record, task_version=load_task("lift_cup").version).write(tmp_path / cell)  # as if trained on what is played
 
     def played() -> str:
         console = Console(record=True, width=300, file=io.StringIO())

@@ -12,11 +12,11 @@ import pytest
 from rich.console import Console
 
 from builders import VERSION_0_1_0
+from codesign_bench.storage.records import CellRecord
 from codesign_bench.studies.corl2023 import experiments
 from codesign_bench.studies.corl2023.experiments import EXPERIMENTS
 from codesign_bench.studies.corl2023.members import METHODS, TASKS
 from codesign_bench.studies.corl2023.protocol import PROTOCOL
-from codesign_bench.storage.records import CellRecord
 from codesign_bench.study import stages_of
 from codesign_bench.task import load_task
 
@@ -52,7 +52,7 @@ def test_the_trials_on_an_arm_are_played_once(tmp_path: Path, monkeypatch: pytes
     shutil.copytree(VERSION_0_1_0 / cell, tmp_path / cell)
     record = CellRecord.read(tmp_path / cell)
     assert record is not None
-    replace(record, task_version=load_task("lift_cup").version).write(tmp_path / cell)  # as if trained on what is played
+    replace(record, task_version=load_task("lift_cup").version).write(tmp_path / cell)
 
     def played() -> str:
         console = Console(record=True, width=300, file=io.StringIO())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -11,6 +12,7 @@ import pytest
 from rich.console import Console
 
 from builders import VERSION_0_1_0
+from codesign_bench.storage.records import CellRecord
 from codesign_bench.studies.corl2023 import experiments
 from codesign_bench.studies.corl2023.experiments import EXPERIMENTS
 from codesign_bench.studies.corl2023.members import METHODS, TASKS
@@ -48,6 +50,9 @@ def test_the_trials_on_an_arm_are_played_once(tmp_path: Path, monkeypatch: pytes
     cell = Path("lift_cup/gnn_ppo/default/seed-00")
     monkeypatch.setattr(experiments, "ON_AN_ARM", ("lift_cup",))
     shutil.copytree(VERSION_0_1_0 / cell, tmp_path / cell)
+    record = CellRecord.read(tmp_path / cell)
+    assert record is not None
+    replace(record, task_version=load_task("lift_cup").version).write(tmp_path / cell)
 
     def played() -> str:
         console = Console(record=True, width=300, file=io.StringIO())

@@ -44,3 +44,5 @@ class Claim:
     rule: Rule
     tasks: tuple[str, ...] = ()
     """Tasks that it speaks of; where results hold nothing of one of them, the claim is not asked."""
+    check_of_scene: bool = False
+    """Whether the scene was chosen so that this holds: then it checks the scene and discovers nothing."""

@@ -17,6 +17,7 @@ from codesign_bench.claims.finding import InsufficientData
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.deployment.tables import load_deployment
 from codesign_bench.errors import UserError
+from codesign_bench.evaluation.cutout_regions import load_cutout_regions
 from codesign_bench.evaluation.extrapolation import load_outside
 from codesign_bench.evaluation.sensitivity import load_sensitivity
 from codesign_bench.stats import CELL_KEYS, MIN_SEEDS
@@ -39,6 +40,8 @@ class Evidence:
     """As `codesign_bench.evaluation.sensitivity.measure` gives it, several tasks below each other."""
     outside: pd.DataFrame = field(default_factory=pd.DataFrame)
     """As `codesign_bench.evaluation.extrapolation.load_or_measure` gives it."""
+    cutout_regions: pd.DataFrame = field(default_factory=pd.DataFrame)
+    """As `codesign_bench.evaluation.cutout_regions.load_cutout_regions` gives it."""
     deployment: pd.DataFrame = field(default_factory=pd.DataFrame)
     """As `codesign_bench.deployment.tables.load_deployment` gives it."""
     design_widths: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -49,8 +52,16 @@ class Evidence:
     @property
     def tasks(self) -> set[str]:
         """Names of the tasks of which anything is known."""
-        frames = (self.curves, self.evaluations, self.sensitivity, self.outside, self.deployment)
+        frames = (self.curves, self.evaluations, self.sensitivity, self.outside, self.cutout_regions, self.deployment)
         return {str(task) for frame in frames if len(frame) for task in frame["task"].unique()}
+
+    def methods(self, task: str) -> list[str]:
+        """Return the names of the methods with finished cells that vary nothing on a task."""
+        rows = self.evaluations
+        if rows.empty:
+            return []
+        own = rows[(rows["task"] == task) & (rows["variant"] == DEFAULT.name)]
+        return sorted({str(method) for method in own["method"]})
 
     def instances(self, task: str, method: str, variant: Variant = DEFAULT) -> pd.DataFrame:
         """Return the final evaluation of the finished cells of one method, task and variant, one row per instance.
@@ -72,6 +83,14 @@ class Evidence:
             InsufficientData: as `instances` does.
         """
         return self.instances(task, method, variant).groupby("seed")["return"].mean().to_numpy()
+
+    def final_successes(self, task: str, method: str, variant: Variant = DEFAULT) -> np.ndarray:
+        """Return the success rate on evaluation instances at the end of training, (N,).
+
+        Raises:
+            InsufficientData: as `instances` does.
+        """
+        return self.instances(task, method, variant).groupby("seed")["success"].mean().to_numpy()
 
     def curve(self, task: str, method: str, variant: Variant = DEFAULT) -> pd.DataFrame:
         """Return the learning curves of the finished cells of one method, task and variant.
@@ -115,11 +134,14 @@ def load_evidence(results: Path) -> Evidence:
     evaluations = _read(load_evaluations, results, ("return", "success", "material", "effort"))
     sensitivity = _read(load_sensitivity, results, ("tool", "goal", "success"))
     outside = _read(load_outside, results, ("task", "method", "seed", "instance", "success"))
+    regions = _read(load_cutout_regions, results, ("task", "method", "cutout", "region", "seed", "instance", "return"))
     deployment = _read(load_deployment, results, ("task", "kind", "tool", "row", "column", "success"))
     if evaluations.empty and sensitivity.empty:
         raise UserError(f"no finished cell in '{results}' yet; create some with: codesign-bench run --out {results}")
     profile = profiles.pop() if len(profiles) == 1 else DEFAULT_PROFILE
-    return Evidence(curves, evaluations, sensitivity, outside, deployment, _design_widths(evaluations), profile)
+    return Evidence(
+        curves, evaluations, sensitivity, outside, regions, deployment, _design_widths(evaluations), profile
+    )
 
 
 def _read(read: Callable[[Path], pd.DataFrame], results: Path, needed: Sequence[str]) -> pd.DataFrame:

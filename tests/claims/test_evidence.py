@@ -41,7 +41,7 @@ def test_unfinished_and_failed_cells_do_not_count(tmp_path: Path) -> None:
     make_results(tmp_path)
     make_cell(tmp_path, "gnn_ppo", 3, 99.0, status=FAILED)
     make_cell(tmp_path, "gnn_ppo", 4, 99.0, status=RUNNING)
-    assert load_evidence(tmp_path).final_returns("push", "gnn_ppo").tolist() == [2.0, 2.0, 2.0]
+    assert load_evidence(tmp_path).final_returns("push", "gnn_ppo").tolist() == [2.0, 2.1, 2.2]
 
 
 def test_final_returns_are_one_mean_per_seed_over_its_instances() -> None:
@@ -111,5 +111,5 @@ def test_cells_of_several_profiles_are_asked_for_with_the_default_one(tmp_path: 
 
 def test_a_folder_in_which_nothing_is_finished_is_answered_with_the_command_that_makes_results(tmp_path: Path) -> None:
     make_cell(tmp_path, OURS, 0, 1.0, status=RUNNING)
-    with pytest.raises(UserError, match="make some with: codesign-bench run --out"):
+    with pytest.raises(UserError, match="create some with: codesign-bench run --out"):
         load_evidence(tmp_path)

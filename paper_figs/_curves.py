@@ -12,6 +12,7 @@ from matplotlib.ticker import EngFormatter, MaxNLocator
 
 from codesign_bench.errors import UserError
 from codesign_bench.figures.comparison import is_compared
+from codesign_bench.stats import on_common_grid
 from codesign_bench.storage.frames import default_rows, require_columns
 
 from ._order import task_order
@@ -41,12 +42,19 @@ def evaluated_rows(frame: pd.DataFrame) -> pd.DataFrame:
     return rows
 
 
-def draw_curves(table: pd.DataFrame, labels: dict[str, str], note: str) -> Figure:
+def seed_curves(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return each seed's curve: columns task, method, quantity, seed, env_steps, value."""
+    parts = (on_common_grid(rows, name).rename(columns={name: "value"}).assign(quantity=name) for name in QUANTITIES)
+    return pd.concat(parts, ignore_index=True)
+
+
+def draw_curves(table: pd.DataFrame, seeds: pd.DataFrame, labels: dict[str, str], note: str) -> Figure:
     """Return for each task a panel of returns above one of success rates, and one legend with seed counts.
 
     Args:
         table: columns task, method, quantity (a key of `QUANTITIES`), env_steps, centre, low, high (NaN where there is
             no interval), seeds (how many reached this step).
+        seeds: what `seed_curves` returns, drawn as thin lines.
         labels: names of methods in the legend, where they differ from the method's.
         note: what lines and bands are.
     """
@@ -64,7 +72,8 @@ def draw_curves(table: pd.DataFrame, labels: dict[str, str], note: str) -> Figur
             top = len(QUANTITIES) * block
             for row, quantity in enumerate(QUANTITIES, start=top):
                 curves = table[(table["task"] == task) & (table["quantity"] == quantity)]
-                _draw_panel(axes[row, column], curves, quantity, styles)
+                single = seeds[(seeds["task"] == task) & (seeds["quantity"] == quantity)]
+                _draw_panel(axes[row, column], curves, single, quantity, styles)
             axes[top, column].set_title(str(task).replace("_", " "))
         for axis in axes.flat:
             axis.set_visible(axis.has_data())
@@ -81,9 +90,12 @@ def method_labels(frame: pd.DataFrame) -> dict[str, str]:
     return dict(zip(known["method"], known["label"], strict=True))
 
 
-def _draw_panel(axes: Axes, curves: pd.DataFrame, quantity: str, styles: dict[str, tuple[str, Dashes]]) -> None:
+def _draw_panel(
+    axes: Axes, curves: pd.DataFrame, seeds: pd.DataFrame, quantity: str, styles: dict[str, tuple[str, Dashes]]
+) -> None:
     """Draw one quantity of one task."""
     for method in reversed(in_order(curves["method"])):  # the paper's own method lies on top
+        draw_seeds(axes, seeds[seeds["method"] == method], styles[method][0], gid=method)
         draw_curve(axes, curves[curves["method"] == method], *styles[method], gid=method)
     axes.set_xlabel("environment steps")
     axes.set_ylabel(QUANTITIES[quantity])
@@ -91,6 +103,12 @@ def _draw_panel(axes: Axes, curves: pd.DataFrame, quantity: str, styles: dict[st
     axes.xaxis.set_major_locator(MaxNLocator(5))
     if quantity == "success_rate":
         axes.set_ylim(-0.03, 1.03)
+
+
+def draw_seeds(axes: Axes, seeds: pd.DataFrame, colour: str, gid: str) -> None:
+    """Draw a thin line for each seed, given columns seed, env_steps, value: a mean of few hides those that fail."""
+    for seed, curve in seeds.groupby("seed"):
+        axes.plot(curve["env_steps"], curve["value"], color=colour, linewidth=0.3, alpha=0.5, gid=f"{gid} seed {seed}")
 
 
 def draw_curve(axes: Axes, curve: pd.DataFrame, colour: str, dashes: Dashes, gid: str) -> None:

@@ -7,14 +7,14 @@ the median cell took as it ran, beside others: one that had to share its core te
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from codesign_bench.cell.variant import DEFAULT_NAME
 from codesign_bench.figures.source import curves
-from codesign_bench.stats import CONFIDENCE, MIN_SEEDS, final_rng, final_values, mean_interval
+from codesign_bench.stats import CONFIDENCE, MIN_SEEDS, final_values, mean_t_interval
 from codesign_bench.text_tables import latex, markdown
 
 from ._curves import PANELS_PER_ROW, QUANTITIES, evaluated_rows, method_labels
@@ -27,10 +27,12 @@ NEEDS = "codesign-bench run --method all --task T --seeds 6"
 ROW_HEIGHT = 0.17
 """Of a method in a panel, in inches."""
 INTERVAL = (
-    f"dot: mean over seeds (n); bar: {CONFIDENCE:.0%} bootstrap interval of the mean, if {MIN_SEEDS} seeds or more"
+    f"large dot: mean over seeds (n); small dots: each seed; bar: {CONFIDENCE:.0%} t interval, if {MIN_SEEDS} or more"
 )
 """The kind of interval, written on the figure."""
 DIGITS = 2
+BOUNDS = {"success_rate": (0.0, 1.0)}
+"""Between which a quantity lies, and so its interval."""
 FARTHEST_SHARE = 0.9
 """A seed counts if it got at least this share of the steps of its method's farthest (ours)."""
 
@@ -65,7 +67,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
             }
             for name in QUANTITIES:
                 values = own[name][name].to_numpy()
-                low, high = mean_interval(values, final_rng(task, method, DEFAULT_NAME, name))
+                low, high = mean_t_interval(values, within=BOUNDS.get(name, (-math.inf, math.inf)))
                 row |= {name: float(values.mean()), f"{name}_low": low, f"{name}_high": high}
             result.append({**row, "minutes": float(own["wall_s"]["wall_s"].median()) / 60.0})
     return pd.DataFrame(result)
@@ -77,7 +79,7 @@ def draw(frame: pd.DataFrame) -> Figure:
     Raises:
         UserError: as `data` does.
     """
-    table = data(frame)
+    table, finals = data(frame), final_values(evaluated_rows(frame), "success_rate")
     tasks = task_order(table["task"])
     columns = min(len(tasks), PANELS_PER_ROW)
     rows = math.ceil(len(tasks) / columns)
@@ -86,7 +88,9 @@ def draw(frame: pd.DataFrame) -> Figure:
         figure = Figure(figsize=(PAGE_WIDTH, rows * (ROW_HEIGHT * most + 0.5) + 0.3), layout="constrained")
         axes = figure.subplots(rows, columns, squeeze=False)
         for axis, task in zip(axes.flat, tasks, strict=False):
-            _draw_panel(axis, table[table["task"] == task], str(task).replace("_", " "))
+            own = table[table["task"] == task]
+            seeds = [_ended(finals, task, method)["success_rate"].tolist() for method in own["method"]]
+            _draw_panel(axis, own, seeds, str(task).replace("_", " "))
         for axis in axes.flat[len(tasks) :]:
             axis.set_visible(False)
         figure.supxlabel(INTERVAL, fontsize=6)
@@ -143,11 +147,13 @@ def _ended(table: pd.DataFrame, task: str, method: str) -> pd.DataFrame:
     return own[own["env_steps"] >= FARTHEST_SHARE * own["env_steps"].max()]
 
 
-def _draw_panel(axes: Axes, table: pd.DataFrame, title: str) -> None:
+def _draw_panel(axes: Axes, table: pd.DataFrame, seeds: Sequence[Sequence[float]], title: str) -> None:
+    """Draw one task: for each row of the table a line with its interval, its mean and each of its seeds."""
     styles = line_styles(table["method"])
     for place, row in enumerate(table.to_dict("records")):
         colour, _ = styles[str(row["method"])]
         axes.plot([row["success_rate_low"], row["success_rate_high"]], [place, place], color=colour, linewidth=2.0)
+        axes.plot(seeds[place], [place] * len(seeds[place]), ".", color="black", markersize=2.0, alpha=0.6, zorder=3)
         axes.plot([row["success_rate"]], [place], "o", color=colour, markersize=4.0, gid=str(row["method"]))
     axes.set_yticks(range(len(table)), [f"{row['label']} ({row['seeds']})" for row in table.to_dict("records")])
     axes.set_ylim(len(table) - 0.5, -0.5)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from codesign_bench.figures.source import curves
 from codesign_bench.stats import MIN_SEEDS, curve_statistics
 
-from ._curves import QUANTITIES, draw_curves, evaluated_rows, method_labels
+from ._curves import QUANTITIES, draw_curves, evaluated_rows, method_labels, seed_curves
 
 TITLE = "Learning curves"
 SOURCE = curves
@@ -21,7 +21,8 @@ COMPARES = True
 """Whether `plot --compare` adds the curves of other results."""
 
 INTERVAL = (
-    f"line: mean over seeds; dotted: not all seeds got this far\nband: ± standard error, if {MIN_SEEDS} seeds or more"
+    "line: mean over seeds; dotted: not all seeds got this far; thin lines: each seed\n"
+    f"band: ± standard error, if {MIN_SEEDS} seeds or more"
 )
 """The kind of interval, written on the figure."""
 
@@ -56,4 +57,5 @@ def draw(frame: pd.DataFrame) -> Figure:
     """
     table = data(frame)
     low, high = table["mean"] - table["standard_error"], table["mean"] + table["standard_error"]
-    return draw_curves(table.assign(centre=table["mean"], low=low, high=high), method_labels(frame), INTERVAL)
+    shown = table.assign(centre=table["mean"], low=low, high=high)
+    return draw_curves(shown, seed_curves(evaluated_rows(frame)), method_labels(frame), INTERVAL)

@@ -277,9 +277,9 @@ def as_markdown(rows: Sequence[Row], study: Claimant, results: Path) -> str:
 
 
 HOW_SURE = (
-    "p-values are two-sided. The adjusted ones account by Holm's method for all claims of the same rule, whose number is "
-    f"in brackets; a verdict that follows from a test needs one below {LEVEL:g}. Below {stats.MIN_SEEDS} seeds there is "
-    "no interval and nothing is decided."
+    "p-values are two-sided. The adjusted ones account by Holm's method for all claims of the same rule, whose number "
+    f"is in brackets; a verdict that follows from a test needs one below {LEVEL:g}. Fewer than {stats.MIN_SEEDS} seeds "
+    "give no interval and decide nothing."
 )
 SCENES = (
     "The scenes were chosen so that one tool does not serve all goals. That no single tool does, and that methods with "

@@ -39,8 +39,10 @@ def varies(values: np.ndarray) -> bool:
     return bool(np.ptp(values) > ROUNDING * np.abs(values).max())
 
 
-def mean_t_interval(values: ArrayLike, *, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Return the t interval of the mean of (N,) values.
+def mean_t_interval(
+    values: ArrayLike, *, confidence: float = CONFIDENCE, within: tuple[float, float] = (-math.inf, math.inf)
+) -> tuple[float, float]:
+    """Return the t interval of the mean of (N,) values, cut off at the ends of `within`, where the mean must lie.
 
     Both ends are NaN below three values, and where all values are equal: then nothing is known of their spread, and an
     interval of no width would promise what three equal seeds cannot.
@@ -48,7 +50,7 @@ def mean_t_interval(values: ArrayLike, *, confidence: float = CONFIDENCE) -> tup
     array = finite(values)
     if array.size < MIN_SEEDS or not varies(array):
         return math.nan, math.nan
-    low, high = scipy_stats.ttest_1samp(array, 0.0).confidence_interval(confidence)
+    low, high = np.clip(scipy_stats.ttest_1samp(array, 0.0).confidence_interval(confidence), *within)
     return float(low), float(high)
 
 

@@ -21,6 +21,11 @@ def test_the_interval_of_a_mean_by_hand() -> None:
     assert mean_t_interval([1.0, 2.0, 3.0]) == pytest.approx((2.0 - half, 2.0 + half), rel=1e-6)
 
 
+def test_an_interval_of_rates_stays_between_zero_and_one() -> None:
+    assert mean_t_interval([0.1, 0.5, 0.9], within=(0.0, 1.0)) == (0.0, 1.0)
+    assert mean_t_interval([0.4, 0.5, 0.6], within=(0.0, 1.0)) == mean_t_interval([0.4, 0.5, 0.6])
+
+
 def test_seeds_that_are_too_few_or_all_equal_give_no_interval() -> None:
     for values in ([], [1.0, 2.0], [0.5, 0.5, 0.5], [1.0, 2.0, math.nan]):
         assert all(math.isnan(end) for end in mean_t_interval(values))

@@ -78,7 +78,7 @@ def draw(frame: pd.DataFrame) -> Figure:
         figure = Figure(figsize=(COLUMN_WIDTH if columns == 1 else PAGE_WIDTH, 1.5 * rows + 0.7), layout="constrained")
         axes = figure.subplots(rows, columns, squeeze=False, sharey=True)
         for axis, ((task, method, start), part) in zip(axes.flat, panels, strict=False):
-            _draw_panel(axis, part, frame[(frame["task"] == task) & (frame["method"] == method)], start)
+            _draw_panel(axis, part, frame[(frame["task"] == task) & (frame["method"] == method)], int(str(start)))
             axis.set_title(f"{str(task).replace('_', ' ')}, start {start}")
         for axis in axes.flat:
             axis.set_visible(axis.has_data())

@@ -9,14 +9,12 @@ from codesign_bench import stats
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, InsufficientData, above
-from codesign_bench.deployment.tables import GRID, OWN
+from codesign_bench.deployment.tables import GRID, OWN, SEED, SOLVED_IN_TRAINING
 
 FEWEST_SEEDS = 5
 """Policies that must have been deployed before their tools say something of the method (ours)."""
 MOSTLY = 0.5
 """Share of trials above which a tool succeeds, and of tools above which the arm keeps them (ours)."""
-SEED, SOLVED_IN_TRAINING = "policy_seed", "solved_in_training"
-"""Columns of trials: the seed of the policy, and whether it solves the same instance with the gantry of training."""
 
 
 def arm_keeps_what_training_solves(task: str, method: str, *, tools: int, trials: int) -> Rule:
@@ -68,6 +66,7 @@ def no_tool_solves_the_grid(task: str, method: str, *, tools: int, starts: int) 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         del rng  # one start that a tool fails is enough
         rows = _trials(evidence, task, GRID, tools)
+        rows = rows[rows[SEED] == rows[SEED].min()]  # the tools of one policy, as in the paper
         tried = int(rows.groupby("tool").size().min())
         if tried < starts:
             raise InsufficientData(f"{tried} starts of the grid of {task} were tried with a tool; {starts} are needed")

@@ -50,8 +50,9 @@ def mean_t_interval(
     array = finite(values)
     if array.size < MIN_SEEDS or not varies(array):
         return math.nan, math.nan
-    low, high = np.clip(scipy_stats.ttest_1samp(array, 0.0).confidence_interval(confidence), *within)
-    return float(low), float(high)
+    ends = scipy_stats.ttest_1samp(array, 0.0).confidence_interval(confidence)
+    low, high = (min(max(float(end), within[0]), within[1]) for end in (ends.low, ends.high))
+    return low, high
 
 
 def welch(first: ArrayLike, second: ArrayLike, *, confidence: float = CONFIDENCE) -> Estimate:

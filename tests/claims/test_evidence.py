@@ -44,7 +44,7 @@ def test_unfinished_and_failed_cells_do_not_count(tmp_path: Path) -> None:
     make_results(tmp_path)
     make_cell(tmp_path, "gnn_ppo", 3, 99.0, status=FAILED)
     make_cell(tmp_path, "gnn_ppo", 4, 99.0, status=RUNNING)
-    assert load_evidence(tmp_path).final_returns("push", "gnn_ppo").tolist() == [2.0, 2.0, 2.0]
+    assert load_evidence(tmp_path).final_returns("push", "gnn_ppo").tolist() == [2.0, 2.1, 2.2]
 
 
 def test_reference_points_are_read_where_there_are_any(tmp_path: Path) -> None:

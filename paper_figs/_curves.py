@@ -54,7 +54,7 @@ def evaluated_rows(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def reference_texts(frame: pd.DataFrame) -> dict[str, str]:
-    """Return the reference points in a frame as the text of a file, by its ending; nothing where there are none."""
+    """Return the reference points in a frame as the text of a file, by its ending; nothing if there are none."""
     points = reference_points_in(frame)
     return {} if points.empty else {"references.csv": points.to_csv(index=False, lineterminator="\n")}
 

@@ -115,7 +115,7 @@ def _lesser_end(evidence: Evidence, task: str, *methods: str) -> float:
 
 
 def shares_of_budget(rows: pd.DataFrame, target: float) -> np.ndarray:
-    """Return (N,): the share of its steps after which each seed's curve reaches `target`; 1 where it never does."""
+    """Return (N,): the share of its steps after which each seed's curve reaches `target`; 1 if it never does."""
     shares = []
     for _, curve in rows.sort_values("env_steps").groupby("seed"):
         steps = curve["env_steps"].to_numpy(dtype=np.float64)

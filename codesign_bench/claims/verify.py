@@ -83,7 +83,7 @@ class Row:
 
     @property
     def p_values(self) -> tuple[str, str]:
-        """The p-value of the claim alone, and the one adjusted for its family with the family's size, as text."""
+        """The p-value of this claim only, and the one adjusted for its family with the family's size, as text."""
         if math.isnan(self.finding.p):
             return "", ""
         return probability(self.finding.p), f"{probability(self.finding.p_adjusted)} ({self.finding.family_size})"

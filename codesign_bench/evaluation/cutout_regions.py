@@ -1,7 +1,7 @@
 """What policies reach in the regions that some of them were not trained on, on instances drawn inside each region.
 
 A region may be easier than the rest of the task. What a policy loses by not having seen it is therefore measured
-against policies of the same method that were trained on everything, on the same instances. The tables lie beside the
+against policies of the same method that were trained on everything, on the same instances. The tables are beside the
 cells, one per task and method; every finished policy is played once on each region.
 
 Shapes: `N` instances, `I` instance.
@@ -90,7 +90,7 @@ def load_cutout_regions(results: Path) -> pd.DataFrame:
 
 
 def _finished(results: Path, task: str, method: str, cutout: float) -> dict[int, StoredCell]:
-    """Return the finished cells trained without a fraction of the region that hold their policies, by seed."""
+    """Return the finished cells trained without a fraction of the region, with stored policies, by seed."""
     wanted = (task, method, DEFAULT if cutout == 0.0 else Variant.of(cutout=cutout))
     return {
         cell.record.seed: cell

@@ -1,6 +1,6 @@
 """Percentile bootstrap intervals: arrays in, numbers out.
 
-They serve statistics over several tasks, where a resample holds many curves. Means of few seeds have the intervals of
+They serve statistics over several tasks, where a resample has many curves. Means of few seeds have the intervals of
 `student.py`, since a resample of three to ten seeds is less diverse than the sample, and the interval too narrow.
 
 Shapes: `N` seeds, `R` resamples. For fewer than `MIN_SEEDS` seeds, intervals are NaN.

@@ -2,7 +2,7 @@
 
 Shapes: `N` and `M` seeds, `L` levels, `P` permutations. If methods do not differ, each way of dealing out the scores to
 the methods is equally probable; the p-value is the share of ways in which the statistic is at least as extreme. All
-ways are tried where there are at most `MOST` of them; otherwise as many are drawn, and the observed one is counted
+ways are tried if there are at most `MOST` of them; otherwise as many are drawn, and the observed one is counted
 among them, so that the test errs on the safe side.
 """
 
@@ -37,7 +37,7 @@ def stratified_p(pairs: Sequence[tuple[ArrayLike, ArrayLike]], rng: np.random.Ge
 
     Args:
         pairs: per task, the scores of two methods, (N,) and (M,).
-        rng: draws permutations where there are too many to try all.
+        rng: draws permutations if there are too many to try all.
 
     Returns:
         The p-value; NaN if a method has no score on some task. A task on which all scores are equal says nothing.
@@ -109,7 +109,7 @@ def jonckheere_p(samples: Sequence[ArrayLike], rng: np.random.Generator, *, same
         return math.nan, math.nan
     level = np.repeat(np.arange(len(arrays)), [array.size for array in arrays])
     scores = np.concatenate(arrays)
-    rising = np.sign(level[None, :] - level[:, None])  # 1 where the second of a pair has the higher level
+    rising = np.sign(level[None, :] - level[:, None])  # 1 if the second of a pair has the higher level
     order = rng.permuted(np.tile(np.arange(len(scores)), (MOST, 1)), axis=1)
     order[0] = np.arange(len(scores))
     apart = scores[None, :] - scores[:, None]

@@ -1,7 +1,7 @@
 """Shares of outcomes that are 0 or 1, of few trials.
 
-A resample of three successes holds three successes: a bootstrap would give an interval of no width. These intervals
-come from the binomial distribution and hold the true share with at least the stated probability.
+Every resample of three successes is three successes: a bootstrap would give an interval of no width. These intervals
+are from the binomial distribution and contain the true share with at least the stated probability.
 """
 
 from __future__ import annotations

@@ -20,9 +20,9 @@ def monotone(values: ArrayLike) -> np.ndarray:
 
 
 def steps_to_reach(steps: ArrayLike, values: ArrayLike, target: float) -> float:
-    """Return the environment steps (T,) at which values (T,), made monotone, reach a target; infinity where never.
+    """Return the environment steps (T,) at which values (T,), made monotone, reach a target; infinity if never.
 
-    Between two evaluations the curve is a straight line.
+    Curves are interpolated linearly between evaluations.
     """
     at, rising = np.asarray(steps, dtype=np.float64), monotone(values)
     if not rising[-1] >= target:

@@ -1,8 +1,8 @@
 """Means of few seeds and their differences, by Student's t: arrays in, numbers out.
 
-Shapes: `N` and `M` seeds. A percentile bootstrap of three to ten seeds covers less than it promises, since a resample
-holds fewer distinct seeds than the sample; the t distribution accounts for the spread being estimated from as few. The
-coverage of each interval, as simulated for seeds that are normal, bimodal or at a ceiling, is in docs/statistics.md.
+Shapes: `N` and `M` seeds. A percentile bootstrap of three to ten seeds is too narrow, since a resample has fewer
+distinct seeds than the sample; the t distribution accounts for a spread that is estimated from few seeds. The coverage
+of each interval, as simulated for seeds that are normal, bimodal or at a ceiling, is in docs/statistics.md.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from codesign_bench.stats.summaries import MIN_SEEDS, finite
 ROUNDING = 1e-9
 """Relative difference up to which values count as equal: means of the same episodes depend on the order of adding."""
 CONFIDENCE = 0.95
-"""Probability with which an interval is meant to hold the true value."""
+"""Nominal coverage of an interval."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ def mean_t_interval(
 ) -> tuple[float, float]:
     """Return the t interval of the mean of (N,) values, cut off at the ends of `within`, where the mean must lie.
 
-    Both ends are NaN below three values, and where all values are equal: then nothing is known of their spread, and an
-    interval of no width would promise what three equal seeds cannot.
+    Both ends are NaN below three values, and if all values are equal: their spread is then unknown, and an interval of
+    no width would be wrong.
     """
     array = finite(values)
     if array.size < MIN_SEEDS or not varies(array):
@@ -76,12 +76,12 @@ def one_sample_t(values: ArrayLike, null: float = 0.0, *, confidence: float = CO
 def welch_across(pairs: Sequence[tuple[ArrayLike, ArrayLike]], *, confidence: float = CONFIDENCE) -> Estimate:
     """Return the mean over tasks of mean(first) - mean(second), with Welch's interval and p-value.
 
-    Each sample of each task has a variance of its own; the degrees of freedom are Satterthwaite's (1946) of the sum of
+    Each sample of each task has a separate variance; the degrees of freedom are Satterthwaite's (1946) of the sum of
     all. Tasks are fixed: the interval is about these tasks, not about others.
 
     Args:
         pairs: per task, the scores of two methods, (N,) and (M,), on a scale that tasks share.
-        confidence: probability that the interval is meant to cover.
+        confidence: nominal coverage of the interval.
 
     Returns:
         Interval and p are NaN if a sample has fewer than three values or none of them varies.
@@ -116,7 +116,7 @@ def _satterthwaite(value: float, samples: Sequence[np.ndarray], weight: float, c
 def equivalent(first: ArrayLike, second: ArrayLike, margin: float, *, alpha: float = 1.0 - CONFIDENCE) -> bool:
     """Return whether the means differ by less than `margin`, by two one-sided Welch tests at level `alpha` (TOST).
 
-    Both tests reject exactly if the interval of confidence 1 - 2 alpha is inside of -margin to margin. Where neither
+    Both tests reject exactly if the interval of confidence 1 - 2 alpha is inside of -margin to margin. If neither
     sample varies, nothing is tested and the answer is no.
 
     Raises:

@@ -39,6 +39,14 @@ def test_returns_are_measured_by_the_largest_mean_of_a_method() -> None:
             effect_scale(nothing, TASK)
 
 
+def test_returns_are_measured_by_the_normalised_range_if_it_is_known() -> None:
+    points = pd.DataFrame({"task": TASK, "point": ["idle", "best_known"], "return_mean": [-1.0, 9.0]})
+    assert effect_scale(Evidence(references=points), TASK) == 10.0
+    turned = points.assign(return_mean=[9.0, -1.0])
+    with pytest.raises(InsufficientData, match="no method has a return"):
+        effect_scale(Evidence(references=turned), TASK)
+
+
 def test_several_are_below_a_threshold_if_each_of_them_is() -> None:
     steps = [Estimate(-2.0, -3.0, -1.0, 0.01), Estimate(-1.0, -1.8, -0.2, 0.04)]
     wider = [Estimate(-2.0, -3.5, -0.5, 0.01), Estimate(-1.0, -2.0, 0.1, 0.04)]

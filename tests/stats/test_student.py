@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from codesign_bench.stats.student import equivalent, mean_t_interval, one_sample_t, welch, welch_across
+from codesign_bench.stats.student import equivalent, mean_across, mean_t_interval, one_sample_t, welch, welch_across
 
 pytestmark = pytest.mark.numeric
 
@@ -79,6 +79,15 @@ def test_two_tasks_halve_the_variance_and_add_their_degrees_of_freedom() -> None
     assert (found.value, found.low, found.high) == pytest.approx((2.0, 2.0 - half, 2.0 + half), rel=1e-6)
     # t = 2 sqrt 3 = 3.464 with 8 degrees of freedom.
     assert found.p == pytest.approx(0.0085, abs=1e-4)
+
+
+def test_a_mean_across_tasks_is_a_difference_from_zero() -> None:
+    found = mean_across([[1.0, 2.0, 3.0], [4.0, 6.0, 8.0, 10.0]])
+    zeros = [0.0] * 9999
+    same = welch_across([([1.0, 2.0, 3.0], zeros), ([4.0, 6.0, 8.0, 10.0], zeros)])
+    assert (found.value, found.low, found.high) == pytest.approx((4.5, same.low, same.high))
+    assert math.isnan(mean_across([]).value)
+    assert math.isnan(mean_across([[1.0, 2.0]]).low)
 
 
 def test_tasks_without_seeds_or_spread_give_no_interval() -> None:

@@ -12,6 +12,7 @@ from matplotlib.ticker import EngFormatter, MaxNLocator
 
 from codesign_bench.errors import UserError
 from codesign_bench.figures.comparison import is_compared
+from codesign_bench.stats import on_common_grid
 from codesign_bench.storage.frames import default_rows, require_columns
 from codesign_bench.storage.reference_points import POINTS, reference_points_in
 
@@ -53,19 +54,30 @@ def evaluated_rows(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def reference_texts(frame: pd.DataFrame) -> dict[str, str]:
-    """Return the reference points in a frame as the text of a file, by its ending; nothing where there are none."""
+    """Return the reference points in a frame as the text of a file, by its ending; nothing if there are none."""
     points = reference_points_in(frame)
     return {} if points.empty else {"references.csv": points.to_csv(index=False, lineterminator="\n")}
 
 
+def seed_curves(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return each seed's curve: columns task, method, quantity, seed, env_steps, value."""
+    parts = (on_common_grid(rows, name).rename(columns={name: "value"}).assign(quantity=name) for name in QUANTITIES)
+    return pd.concat(parts, ignore_index=True)
+
+
 def draw_curves(
-    table: pd.DataFrame, labels: dict[str, str], note: str, references: pd.DataFrame | None = None
+    table: pd.DataFrame,
+    seeds: pd.DataFrame,
+    labels: dict[str, str],
+    note: str,
+    references: pd.DataFrame | None = None,
 ) -> Figure:
     """Return for each task a panel of returns above one of success rates, and one legend with seed counts.
 
     Args:
         table: columns task, method, quantity (a key of `QUANTITIES`), env_steps, centre, low, high (NaN where there is
             no interval), seeds (the number that reached this step).
+        seeds: rows of `seed_curves`, drawn as thin lines.
         labels: names of methods in the legend, if they differ from the method's.
         note: explanation of lines and bands.
         references: levels to draw as thin grey lines, rows of `reference_points_in`; None: none.
@@ -86,7 +98,8 @@ def draw_curves(
             top = len(QUANTITIES) * block
             for row, quantity in enumerate(QUANTITIES, start=top):
                 curves = table[(table["task"] == task) & (table["quantity"] == quantity)]
-                _draw_panel(axes[row, column], curves, quantity, styles)
+                single = seeds[(seeds["task"] == task) & (seeds["quantity"] == quantity)]
+                _draw_panel(axes[row, column], curves, single, quantity, styles)
                 draw_references(axes[row, column], levels[levels["task"] == task], quantity)
             axes[top, column].set_title(str(task).replace("_", " "))
         for axis in axes.flat:
@@ -104,9 +117,12 @@ def method_labels(frame: pd.DataFrame) -> dict[str, str]:
     return dict(zip(known["method"], known["label"], strict=True))
 
 
-def _draw_panel(axes: Axes, curves: pd.DataFrame, quantity: str, styles: dict[str, tuple[str, Dashes]]) -> None:
+def _draw_panel(
+    axes: Axes, curves: pd.DataFrame, seeds: pd.DataFrame, quantity: str, styles: dict[str, tuple[str, Dashes]]
+) -> None:
     """Draw one quantity of one task."""
     for method in reversed(in_order(curves["method"])):  # the paper's own method on top
+        draw_seeds(axes, seeds[seeds["method"] == method], styles[method][0], gid=method)
         draw_curve(axes, curves[curves["method"] == method], *styles[method], gid=method)
     axes.set_xlabel("environment steps")
     axes.set_ylabel(QUANTITIES[quantity])
@@ -122,6 +138,12 @@ def draw_references(axes: Axes, points: pd.DataFrame, quantity: str) -> None:
         colour, dashes = REFERENCE_STYLES[str(row["point"])]
         level, name = float(row[quantity]), f"reference {row['point']}"
         axes.axhline(level, color=colour, linestyle=dashes, linewidth=REFERENCE_WIDTH, zorder=1.5, gid=name)
+
+
+def draw_seeds(axes: Axes, seeds: pd.DataFrame, colour: str, gid: str) -> None:
+    """Draw a thin line for each seed, given columns seed, env_steps, value: a mean of few hides those that fail."""
+    for seed, curve in seeds.groupby("seed"):
+        axes.plot(curve["env_steps"], curve["value"], color=colour, linewidth=0.3, alpha=0.5, gid=f"{gid} seed {seed}")
 
 
 def draw_curve(axes: Axes, curve: pd.DataFrame, colour: str, dashes: Dashes, gid: str) -> None:

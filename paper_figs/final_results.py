@@ -9,22 +9,20 @@ shared its core says nothing about the method.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from codesign_bench.cell.variant import DEFAULT_NAME
 from codesign_bench.figures.source import curves_with_references
 from codesign_bench.stats import (
     CONFIDENCE,
     MIN_SEEDS,
-    bootstrap,
-    final_rng,
     final_values,
-    mean_interval,
+    mean_across,
+    mean_t_interval,
     normalized_score,
 )
 from codesign_bench.storage.reference_points import reference_points_in, references
@@ -40,7 +38,7 @@ NEEDS = "codesign-bench run --method all --task T --seeds 6"
 ROW_HEIGHT = 0.17
 """Height of a method in a panel, in inches."""
 INTERVAL = (
-    f"dot: mean over seeds (n); bar: {CONFIDENCE:.0%} bootstrap interval of the mean, if {MIN_SEEDS} seeds or more"
+    f"large dot: mean over seeds (n); small dots: each seed; bar: {CONFIDENCE:.0%} t interval, if {MIN_SEEDS} or more"
 )
 """The kind of interval, written on the figure."""
 DIGITS = 2
@@ -49,6 +47,8 @@ AVERAGE = "average"
 """In the place of a task: the mean over all tasks that have reference points."""
 SAME_BUDGET = 0.02
 """Largest part of the steps by which methods of one budget differ (ours)."""
+BOUNDS = {"success_rate": (0.0, 1.0)}
+"""Range of a quantity, which ends its intervals."""
 FARTHEST_SHARE = 0.9
 """A seed counts if it has at least this fraction of the most steps of its method (ours)."""
 
@@ -87,7 +87,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
             }
             for name in QUANTITIES:
                 values = own[name][name].to_numpy()
-                low, high = mean_interval(values, final_rng(task, method, DEFAULT_NAME, name))
+                low, high = mean_t_interval(values, within=BOUNDS.get(name, (-math.inf, math.inf)))
                 row |= {name: float(values.mean()), f"{name}_low": low, f"{name}_high": high}
             # The score is linear in the return, and so are the ends of its interval.
             for end in ("", "_low", "_high"):
@@ -111,7 +111,7 @@ def draw(frame: pd.DataFrame) -> Figure:
     Raises:
         UserError: as `data` does.
     """
-    table = per_task(data(frame))
+    table, finals = per_task(data(frame)), final_values(evaluated_rows(frame), "success_rate")
     tasks = task_order(table["task"])
     columns = min(len(tasks), PANELS_PER_ROW)
     rows = math.ceil(len(tasks) / columns)
@@ -120,7 +120,9 @@ def draw(frame: pd.DataFrame) -> Figure:
         figure = Figure(figsize=(PAGE_WIDTH, rows * (ROW_HEIGHT * most + 0.5) + 0.3), layout="constrained")
         axes = figure.subplots(rows, columns, squeeze=False)
         for axis, task in zip(axes.flat, tasks, strict=False):
-            _draw_panel(axis, table[table["task"] == task], str(task).replace("_", " "))
+            own = table[table["task"] == task]
+            seeds = [_ended(finals, task, method)["success_rate"].tolist() for method in own["method"]]
+            _draw_panel(axis, own, seeds, str(task).replace("_", " "))
         for axis in axes.flat[len(tasks) :]:
             axis.set_visible(False)
         figure.supxlabel(INTERVAL, fontsize=6)
@@ -188,8 +190,7 @@ def _averages(table: pd.DataFrame, scores: Mapping[str, Mapping[str, np.ndarray]
         if set(scores[method]) != tasks:
             continue
         own = table[(table["method"] == method) & table["task"].isin(tasks)]
-        seeds = list(scores[method].values())
-        low, high = bootstrap(seeds, _mean_of_means, final_rng(AVERAGE, method, DEFAULT_NAME, SCORE))
+        found = mean_across(list(scores[method].values()))
         rows.append(
             {
                 "task": AVERAGE,
@@ -198,16 +199,11 @@ def _averages(table: pd.DataFrame, scores: Mapping[str, Mapping[str, np.ndarray]
                 "seeds": own["seeds"].min(),
                 "env_steps": own["env_steps"].mean(),
                 SCORE: own[SCORE].mean(),
-                f"{SCORE}_low": float(low),
-                f"{SCORE}_high": float(high),
+                f"{SCORE}_low": found.low,
+                f"{SCORE}_high": found.high,
             }
         )
     return [pd.DataFrame(rows)] if rows else []
-
-
-def _mean_of_means(*tasks: np.ndarray) -> np.ndarray:
-    """Return (R,) means over tasks of the means over seeds of (R, N) resampled scores each."""
-    return np.mean([sample.mean(axis=1) for sample in tasks], axis=0)
 
 
 def _steps(values: pd.Series[float]) -> str:
@@ -227,11 +223,13 @@ def _ended(table: pd.DataFrame, task: str, method: str) -> pd.DataFrame:
     return own[own["env_steps"] >= FARTHEST_SHARE * own["env_steps"].max()]
 
 
-def _draw_panel(axes: Axes, table: pd.DataFrame, title: str) -> None:
+def _draw_panel(axes: Axes, table: pd.DataFrame, seeds: Sequence[Sequence[float]], title: str) -> None:
+    """Draw one task: for each row of the table a line with its interval, its mean and each of its seeds."""
     styles = line_styles(table["method"])
     for place, row in enumerate(table.to_dict("records")):
         colour, _ = styles[str(row["method"])]
         axes.plot([row["success_rate_low"], row["success_rate_high"]], [place, place], color=colour, linewidth=2.0)
+        axes.plot(seeds[place], [place] * len(seeds[place]), ".", color="black", markersize=2.0, alpha=0.6, zorder=3)
         axes.plot([row["success_rate"]], [place], "o", color=colour, markersize=4.0, gid=str(row["method"]))
     axes.set_yticks(range(len(table)), [f"{row['label']} ({row['seeds']})" for row in table.to_dict("records")])
     axes.set_ylim(len(table) - 0.5, -0.5)

@@ -15,7 +15,7 @@ from codesign_bench.figures.source import curves
 from codesign_bench.stats import MIN_SEEDS, curve_statistics
 from codesign_bench.storage.frames import require_columns, rows_varying
 
-from ._curves import draw_curve
+from ._curves import draw_curve, draw_seeds
 from ._style import BLUE, COLUMN_WIDTH, ORANGE, PAGE_WIDTH, style
 
 TITLE = "Fine-tuning"
@@ -27,7 +27,8 @@ KINDS = {
 }
 """Axis that cells vary: its name in the legend, and its colour."""
 INTERVAL = (
-    f"line: mean over seeds; dotted: not all seeds got this far; band: ± standard error, if {MIN_SEEDS} seeds or more"
+    "line: mean over seeds; dotted: not all seeds got this far; thin lines: each seed\n"
+    f"band: ± standard error, if {MIN_SEEDS} seeds or more"
 )
 NEEDED = ("task", "method", "variant", "seed", "return_mean", "gradient_steps")
 PANELS_PER_ROW = 4
@@ -76,8 +77,8 @@ def draw(frame: pd.DataFrame) -> Figure:
     with style():
         figure = Figure(figsize=(COLUMN_WIDTH if columns == 1 else PAGE_WIDTH, 1.5 * rows + 0.7), layout="constrained")
         axes = figure.subplots(rows, columns, squeeze=False, sharey=True)
-        for axis, ((task, _, start), part) in zip(axes.flat, panels, strict=False):
-            _draw_panel(axis, part)
+        for axis, ((task, method, start), part) in zip(axes.flat, panels, strict=False):
+            _draw_panel(axis, part, frame[(frame["task"] == task) & (frame["method"] == method)], int(str(start)))
             axis.set_title(f"{str(task).replace('_', ' ')}, start {start}")
         for axis in axes.flat:
             axis.set_visible(axis.has_data())
@@ -93,9 +94,13 @@ def draw(frame: pd.DataFrame) -> Figure:
     return figure
 
 
-def _draw_panel(axes: Axes, part: pd.DataFrame) -> None:
-    """Draw both curves of one start."""
+def _draw_panel(axes: Axes, part: pd.DataFrame, rows: pd.DataFrame, start: int) -> None:
+    """Draw both curves of one start: their statistics in `part`, and each seed in the `rows` of the method."""
     for kind, (_, colour) in KINDS.items():
+        varied = rows_varying(rows, kind)
+        seeds = varied[varied[kind] == start].sort_values("gradient_steps")
+        named = seeds.assign(env_steps=seeds["gradient_steps"], value=seeds["return_mean"]).dropna(subset=["value"])
+        draw_seeds(axes, named, colour, gid=kind)
         curve = part[part["kind"] == kind]
         values, error = curve["mean"], curve["standard_error"]
         along = curve.assign(env_steps=curve["gradient_steps"], centre=values, low=values - error, high=values + error)

@@ -29,6 +29,7 @@ NEEDED = (
 )
 MAP_FRACTION = 0.6
 """The paper's fraction in the map; the nearest fraction in the results is drawn."""
+KEYS = ["task", "method", "label", "cutout", "region"]
 PANEL_HEIGHT = 2.1
 """Height of a row of panels, in inches."""
 
@@ -38,7 +39,7 @@ REGIONS: dict[str, tuple[str, Dashes, str, str]] = {
     "outside": (PINK, "-.", "^", "outside the training region (unseen)"),
 }
 """Regions: colour, dashes, marker and name."""
-NOTE = f"right: mean over seeds; bars: ± standard error, if {MIN_SEEDS} seeds or more"
+NOTE = f"right: mean over seeds; dots: each seed; bars: ± standard error, if {MIN_SEEDS} seeds or more"
 
 
 def data(frame: pd.DataFrame) -> pd.DataFrame:
@@ -54,13 +55,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column, or every evaluation, is missing.
     """
-    keys = ["task", "method", "label", "cutout", "region"]
-    seeds = (
-        _starts(frame)
-        .groupby([*keys, "seed"], as_index=False)
-        .agg(value=("return", "mean"), success=("success", "mean"), starts=("instance", "nunique"))
-    )
-    grouped = seeds.groupby(keys)
+    grouped = _seeds(frame).groupby(KEYS)
     table = grouped.agg(
         return_mean=("value", mean),
         standard_error=("value", standard_error),
@@ -71,13 +66,19 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     return table.reset_index()
 
 
+def _seeds(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return one row per region and seed, with the columns `KEYS`, seed, value (mean return), success, starts."""
+    grouped = _starts(frame).groupby([*KEYS, "seed"], as_index=False)
+    return grouped.agg(value=("return", "mean"), success=("success", "mean"), starts=("instance", "nunique"))
+
+
 def draw(frame: pd.DataFrame) -> Figure:
     """Return the figure: for each task and method, a map of starts and the return over the fractions.
 
     Raises:
         UserError: as `data` does.
     """
-    starts, table = _starts(frame), data(frame)
+    starts, table, seeds = _starts(frame), data(frame), _seeds(frame)
     pairs = _pairs(starts)
     with style():
         figure = Figure(figsize=(PAGE_WIDTH, PANEL_HEIGHT * len(pairs) + 0.5), layout="constrained")
@@ -87,7 +88,8 @@ def draw(frame: pd.DataFrame) -> Figure:
             fraction = _map_fraction(own)
             places = frame[(frame["kind"] == "place") & (frame["task"] == task) & (frame["cutout"] == fraction)]
             _draw_map(figure, left, own[own["cutout"] == fraction], places)
-            _draw_returns(right, table[(table["task"] == task) & (table["method"] == method)])
+            part, single = (rows[(rows["task"] == task) & (rows["method"] == method)] for rows in (table, seeds))
+            _draw_returns(right, part, single)
         shown = [REGIONS[region] for region in REGIONS if region in set(table["region"])]
         handles = [Line2D([], [], color=c, linestyle=d, marker=m, ms=3, label=text) for c, d, m, text in shown]
         figure.legend(handles=handles, loc="outside lower center", ncols=3, title=NOTE, title_fontsize=5.5)
@@ -187,11 +189,13 @@ def _shade_line(axes: Axes, places: pd.DataFrame) -> None:
         )
 
 
-def _draw_returns(axes: Axes, table: pd.DataFrame) -> None:
-    """Draw the return in each region over the cutout fraction."""
+def _draw_returns(axes: Axes, table: pd.DataFrame, seeds: pd.DataFrame) -> None:
+    """Draw the return in each region over the cutout fraction, its mean and each seed."""
     for region, (colour, dashes, marker, _) in REGIONS.items():
         own = table[table["region"] == region].sort_values("cutout")
         if len(own):
+            single = seeds[seeds["region"] == region]
+            axes.plot(single["cutout"], single["value"], ".", color=colour, markersize=2.5, alpha=0.5)
             axes.errorbar(
                 own["cutout"],
                 own["return_mean"],

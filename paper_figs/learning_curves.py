@@ -14,7 +14,7 @@ from codesign_bench.figures.source import curves_with_references
 from codesign_bench.stats import MIN_SEEDS, curve_statistics
 from codesign_bench.storage.reference_points import reference_points_in
 
-from ._curves import QUANTITIES, draw_curves, evaluated_rows, method_labels, reference_texts
+from ._curves import QUANTITIES, draw_curves, evaluated_rows, method_labels, reference_texts, seed_curves
 
 TITLE = "Learning curves"
 SOURCE = curves_with_references
@@ -23,7 +23,8 @@ COMPARES = True
 """Whether `plot --compare` adds the curves of other results."""
 
 INTERVAL = (
-    f"line: mean over seeds; dotted: not all seeds got this far\nband: ± standard error, if {MIN_SEEDS} seeds or more"
+    "line: mean over seeds; dotted: not all seeds got this far; thin lines: each seed\n"
+    f"band: ± standard error, if {MIN_SEEDS} seeds or more"
 )
 """The kind of interval, written on the figure."""
 
@@ -58,11 +59,13 @@ def draw(frame: pd.DataFrame) -> Figure:
     """
     table = data(frame)
     low, high = table["mean"] - table["standard_error"], table["mean"] + table["standard_error"]
+    rows = evaluated_rows(frame)
     return draw_curves(
         table.assign(centre=table["mean"], low=low, high=high),
+        seed_curves(rows),
         method_labels(frame),
         INTERVAL,
-        reference_points_in(evaluated_rows(frame)),
+        reference_points_in(rows),
     )
 
 

@@ -24,10 +24,11 @@ TITLE = "Trade-off of design and control"
 SOURCE = evaluations
 NEEDS = "codesign-bench run --method M --task T --seeds 3 --alpha 0 0.3 0.7 1"
 NEEDED = ("task", "method", "label", "variant", "alpha", "seed", "material", "effort")
+KEYS = ["task", "method", "label", "alpha"]
 PANEL_HEIGHT = 1.7
 """Height of a row of panels, in inches."""
 NOTE = (
-    f"mean over seeds; bars: ± standard error, if {MIN_SEEDS} seeds or more\n"
+    f"mean over seeds; dots: each seed; bars: ± standard error, if {MIN_SEEDS} seeds or more\n"
     r"equation 1 weights material by $\alpha$ and effort by $1 - \alpha$"
 )
 
@@ -53,17 +54,20 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Raises:
         UserError: a column, or every cell with an alpha, is missing.
     """
+    grouped = _seeds(frame).groupby([*KEYS, "quantity"], sort=False)["value"]
+    table = grouped.agg(mean=mean, standard_error=standard_error, seeds="size").reset_index()
+    return table[["task", "method", "label", "quantity", "alpha", "mean", "standard_error", "seeds"]]
+
+
+def _seeds(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return one row per quantity and seed, with the columns `KEYS`, seed, quantity, value."""
     require_columns(frame, NEEDED, "the evaluations")
     rows = rows_varying(frame, "alpha")
     if rows.empty:
         raise UserError("no finished cell with an alpha")
-    keys = ["task", "method", "label", "alpha"]
-    seeds = rows.groupby([*keys, "seed"], as_index=False)[["material", "effort"]].mean()
+    seeds = rows.groupby([*KEYS, "seed"], as_index=False)[["material", "effort"]].mean()
     seeds["ratio"] = seeds["material"] / seeds["effort"].where(seeds["effort"] > 0.0)
-    long = seeds.melt([*keys, "seed"], list(QUANTITIES), "quantity", "value")
-    grouped = long.groupby([*keys, "quantity"], sort=False)["value"]
-    table = grouped.agg(mean=mean, standard_error=standard_error, seeds="size").reset_index()
-    return table[["task", "method", "label", "quantity", "alpha", "mean", "standard_error", "seeds"]]
+    return seeds.melt([*KEYS, "seed"], list(QUANTITIES), "quantity", "value")
 
 
 def draw(frame: pd.DataFrame) -> Figure:
@@ -72,7 +76,7 @@ def draw(frame: pd.DataFrame) -> Figure:
     Raises:
         UserError: as `data` does.
     """
-    table = data(frame)
+    table, seeds = data(frame), _seeds(frame)
     styles = line_styles(table["method"])
     tasks = task_order(table["task"])
     with style():
@@ -80,7 +84,8 @@ def draw(frame: pd.DataFrame) -> Figure:
         panels = figure.subplots(len(tasks), len(QUANTITIES), squeeze=False)
         for line, task in zip(panels, tasks, strict=True):
             for axes, quantity in zip(line, QUANTITIES, strict=True):
-                _draw_panel(axes, table[(table["task"] == task) & (table["quantity"] == quantity)], styles)
+                own, single = (part[(part["task"] == task) & (part["quantity"] == quantity)] for part in (table, seeds))
+                _draw_panel(axes, own, single, styles)
                 axes.set_ylabel(QUANTITIES[quantity])
             line[0].set_title(str(task).replace("_", " "), loc="left")
         _add_legend(figure, table, styles)
@@ -88,10 +93,12 @@ def draw(frame: pd.DataFrame) -> Figure:
     return figure
 
 
-def _draw_panel(axes: Axes, table: pd.DataFrame, styles: dict[str, tuple[str, Dashes]]) -> None:
+def _draw_panel(axes: Axes, table: pd.DataFrame, seeds: pd.DataFrame, styles: dict[str, tuple[str, Dashes]]) -> None:
     for method in reversed(in_order(table["method"])):  # the paper's own method on top
         colour, dashes = styles[method]
         own = table[table["method"] == method].sort_values("alpha")
+        single = seeds[seeds["method"] == method]
+        axes.plot(single["alpha"], single["value"], ".", color=colour, markersize=2.5, alpha=0.5)
         axes.errorbar(
             own["alpha"],
             own["mean"],

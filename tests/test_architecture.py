@@ -46,6 +46,7 @@ TESTED_ELSEWHERE = {
 """Modules without a test file of their own -> why, and which tests cover them."""
 
 OF_NO_MODULE = {
+    "tests/claims/test_a_a.py": "of all rules that compare methods",
     "tests/docs/test_make_task_pages.py": "of the script docs/make_task_pages.py",
     "tests/docs/test_pages.py": "of the documentation",
     "tests/learning/test_pendulum.py": "of the whole learner, beside another library's",
@@ -55,6 +56,7 @@ OF_NO_MODULE = {
     "tests/methods/test_start_from.py": "of every method",
     "tests/results/test_reference.py": "of the shipped results",
     "tests/results/test_ship_cells.py": "of the script results/ship_cells.py",
+    "tests/stats/test_coverage.py": "of all intervals, beside the page on statistics",
     "tests/stats/test_rliable.py": "of all statistics, beside another library's",
     "tests/storage/test_version_0_1_0.py": "of the whole program, on results of an earlier version",
     "tests/studies/corl2023/test_tables.py": "of several modules of data, beside the paper's tables",

@@ -44,3 +44,5 @@ class Claim:
     rule: Rule
     tasks: tuple[str, ...] = ()
     """Tasks of the claim; without results of all of them, the claim is not asked."""
+    check_of_scene: bool = False
+    """Whether the scene was chosen so that the claim holds; the claim then checks the scene and is no discovery."""

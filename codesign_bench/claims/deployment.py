@@ -5,35 +5,54 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from codesign_bench import stats
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, InsufficientData
-from codesign_bench.deployment.tables import GRID, OWN
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, InsufficientData, above
+from codesign_bench.deployment.tables import GRID, OWN, SEED, SOLVED_IN_TRAINING
+
+FEWEST_SEEDS = 5
+"""Policies that must have been deployed before their tools say something of the method (ours)."""
+MOSTLY = 0.5
+"""Share of trials above which a tool succeeds, and of tools above which the arm keeps them (ours)."""
 
 
-def own_instance_solved(task: str, method: str, *, tools: int, trials: int) -> Rule:
-    """Return the rule for "deployed policies succeed on the instance of `task` that their tool was designed for".
+def arm_keeps_what_training_solves(task: str, method: str, *, tools: int, trials: int) -> Rule:
+    """Return the rule for "policies succeed on the arm on the instance of `task` that their tool was designed for".
 
-    At least `tools` tools and `trials` trials of each are needed.
+    An instance that a policy does not solve in training physics says nothing about the arm. At least
+    `FEWEST_SEEDS` policies, `tools` tools of each and `trials` trials of each tool are needed.
     """
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
-        del rng  # few trials of one policy: an interval would say nothing about other policies
+        del rng  # nothing is drawn
         rows = _trials(evidence, task, OWN, tools)
-        rates = rows.groupby("tool")["success"].mean()
-        made = int(rows.groupby("tool").size().min())
+        if SOLVED_IN_TRAINING not in rows.columns or rows[SOLVED_IN_TRAINING].isna().any():
+            raise InsufficientData(
+                f"no trial of {task} says whether its policy solves the instance in training physics"
+            )
+        seeds = rows[SEED].nunique()
+        if seeds < FEWEST_SEEDS:
+            raise InsufficientData(f"policies of {seeds} seeds of {task} were deployed; {FEWEST_SEEDS} are needed")
+        made = int(rows.groupby([SEED, "tool"]).size().min())
         if made < trials:
             raise InsufficientData(f"{made} trials of a tool of {task}; {trials} are needed")
-        share = float((rates > 0.5).mean())
-        n = f"{len(rates)} tools, {len(rows)} trials"
-        return Finding(SUPPORTED if share == 1.0 else CONTRADICTED, share, n=n, note=_told(rows))
+        solved = rows[rows[SOLVED_IN_TRAINING] > 0]
+        rates = solved.groupby([SEED, "tool"])["success"].mean()
+        if not len(rates):
+            raise InsufficientData(f"no deployed policy solves its own instances of {task} in training physics")
+        found = stats.proportion_test(int((rates > MOSTLY).sum()), len(rates), MOSTLY)
+        n = f"{len(rates)} of {rows.groupby([SEED, 'tool']).ngroups} tools solved in training, {seeds} seeds"
+        return Finding(above(found, MOSTLY), found.value, found.low, found.high, n, _told(solved), found.p)
 
     return Rule(
-        kind="own instance solved",
-        statistic="share of tools that succeed in more than half of their trials on their own instance",
-        words=f"supported if it is 1, contradicted if below, over at least {tools} tools and {trials} trials of "
-        "each; no interval",
-        needs=_needs(task, method),
+        kind="the arm keeps what training solves",
+        statistic="of the tools that solve their own instance in training physics, share that succeed in more than "
+        "half of their trials on the arm",
+        words=f"over at least {FEWEST_SEEDS} policies, {tools} tools of each and {trials} trials of each tool, "
+        f"supported if the exact 95 % interval (Clopper and Pearson) is above {MOSTLY:g}, contradicted if below "
+        f"{MOSTLY:g}",
+        needs=_needs(task, method, FEWEST_SEEDS),
         judge=judge,
     )
 
@@ -47,6 +66,7 @@ def no_tool_solves_the_grid(task: str, method: str, *, tools: int, starts: int) 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         del rng  # one failed start per tool is enough: nothing is estimated from a sample
         rows = _trials(evidence, task, GRID, tools)
+        rows = rows[rows[SEED] == rows[SEED].min()]  # the tools of one policy, as in the paper
         tried = int(rows.groupby("tool").size().min())
         if tried < starts:
             raise InsufficientData(f"{tried} starts of the grid of {task} were tried with a tool; {starts} are needed")
@@ -89,6 +109,6 @@ def _told(rows: pd.DataFrame) -> str:
     return "successes by tool: " + ", ".join(f"{won}/{all_}" for won, all_ in counts.itertuples(index=False))
 
 
-def _needs(task: str, method: str) -> tuple[str, ...]:
-    cell = f"{{results}}/{task}/{method}/default/seed-00"
-    return (f"codesign-bench deploy --policy {cell} --protocol --out {{results}}",)
+def _needs(task: str, method: str, seeds: int = 1) -> tuple[str, ...]:
+    cells = (f"{{results}}/{task}/{method}/default/seed-{seed:02d}" for seed in range(seeds))
+    return tuple(f"codesign-bench deploy --policy {cell} --protocol --out {{results}}" for cell in cells)

@@ -17,6 +17,7 @@ from codesign_bench.claims.finding import InsufficientData
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.deployment.tables import load_deployment
 from codesign_bench.errors import UserError
+from codesign_bench.evaluation.cutout_regions import load_cutout_regions
 from codesign_bench.evaluation.extrapolation import load_outside
 from codesign_bench.evaluation.sensitivity import load_sensitivity
 from codesign_bench.stats import CELL_KEYS, MIN_SEEDS
@@ -40,6 +41,8 @@ class Evidence:
     """Rows of `codesign_bench.evaluation.sensitivity.measure` for several tasks."""
     outside: pd.DataFrame = field(default_factory=pd.DataFrame)
     """Rows of `codesign_bench.evaluation.extrapolation.load_or_measure`."""
+    cutout_regions: pd.DataFrame = field(default_factory=pd.DataFrame)
+    """Rows of `codesign_bench.evaluation.cutout_regions.load_cutout_regions`."""
     deployment: pd.DataFrame = field(default_factory=pd.DataFrame)
     """Rows of `codesign_bench.deployment.tables.load_deployment`."""
     design_widths: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -47,13 +50,21 @@ class Evidence:
     profile: str = DEFAULT_PROFILE
     """The profile of the cells, if it is the same for all, so that commands for missing data match them."""
     references: pd.DataFrame = field(default_factory=pd.DataFrame)
-    """Rows of `codesign_bench.storage.reference_points.load_reference_points`."""
+    """Rows of `codesign_bench.storage.reference_points.load_reference_points`, for the task versions of the cells."""
 
     @property
     def tasks(self) -> set[str]:
         """Names of the tasks with any data."""
-        frames = (self.curves, self.evaluations, self.sensitivity, self.outside, self.deployment)
+        frames = (self.curves, self.evaluations, self.sensitivity, self.outside, self.cutout_regions, self.deployment)
         return {str(task) for frame in frames if len(frame) for task in frame["task"].unique()}
+
+    def methods(self, task: str) -> list[str]:
+        """Return the names of the methods with finished cells that vary nothing on a task."""
+        rows = self.evaluations
+        if rows.empty:
+            return []
+        own = rows[(rows["task"] == task) & (rows["variant"] == DEFAULT.name)]
+        return sorted({str(method) for method in own["method"]})
 
     def instances(self, task: str, method: str, variant: Variant = DEFAULT) -> pd.DataFrame:
         """Return the final evaluation of the finished cells of one method, task and variant, one row per instance.
@@ -75,6 +86,14 @@ class Evidence:
             InsufficientData: as `instances` does.
         """
         return self.instances(task, method, variant).groupby("seed")["return"].mean().to_numpy()
+
+    def final_successes(self, task: str, method: str, variant: Variant = DEFAULT) -> np.ndarray:
+        """Return the success rate on evaluation instances at the end of training, (N,).
+
+        Raises:
+            InsufficientData: as `instances` does.
+        """
+        return self.instances(task, method, variant).groupby("seed")["success"].mean().to_numpy()
 
     def curve(self, task: str, method: str, variant: Variant = DEFAULT) -> pd.DataFrame:
         """Return the learning curves of the finished cells of one method, task and variant.
@@ -113,18 +132,21 @@ def load_evidence(results: Path) -> Evidence:
     Raises:
         UserError: the folder does not exist, or has neither a finished cell nor a design-sensitivity table.
     """
-    profiles = {cell.record.profile for cell in reported_cells(results)}
+    records = [cell.record for cell in reported_cells(results)]
+    profiles = {record.profile for record in records}
     curves = _read(load_results, results, ("return_mean", "success_rate"))
     evaluations = _read(load_evaluations, results, ("return", "success", "material", "effort"))
     sensitivity = _read(load_sensitivity, results, ("tool", "goal", "success"))
     outside = _read(load_outside, results, ("task", "method", "seed", "instance", "success"))
+    regions = _read(load_cutout_regions, results, ("task", "method", "cutout", "region", "seed", "instance", "return"))
     deployment = _read(load_deployment, results, ("task", "kind", "tool", "row", "column", "success"))
-    references = _read(load_reference_points, results, ("task", "point", "return_mean", "success_rate"))
+    points = _read(load_reference_points, results, ("task", "task_version", "point", "return_mean", "success_rate"))
+    references = _of_versions(points, {(record.task, record.task_version) for record in records})
     if evaluations.empty and sensitivity.empty:
         raise UserError(f"no finished cell in '{results}' yet; create some with: codesign-bench run --out {results}")
     profile = profiles.pop() if len(profiles) == 1 else DEFAULT_PROFILE
     widths = _design_widths(evaluations)
-    return Evidence(curves, evaluations, sensitivity, outside, deployment, widths, profile, references)
+    return Evidence(curves, evaluations, sensitivity, outside, regions, deployment, widths, profile, references)
 
 
 def _read(read: Callable[[Path], pd.DataFrame], results: Path, needed: Sequence[str]) -> pd.DataFrame:
@@ -143,6 +165,14 @@ def _read(read: Callable[[Path], pd.DataFrame], results: Path, needed: Sequence[
         if column not in frame.columns or frame[column].isna().any():
             raise UserError(f"a table in '{results}' is damaged or not ours: values of '{column}' are missing")
     return frame
+
+
+def _of_versions(points: pd.DataFrame, played: set[tuple[str, int]]) -> pd.DataFrame:
+    """Return the reference points of tasks whose cells, each (task, version), are all of the version of the points."""
+    if points.empty:
+        return points
+    versions = zip(points["task"], points["task_version"], strict=True)
+    return points[[{own for own in played if own[0] == task} <= {(task, int(version))} for task, version in versions]]
 
 
 def _design_widths(evaluations: pd.DataFrame) -> dict[str, dict[str, float]]:

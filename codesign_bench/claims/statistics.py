@@ -1,28 +1,33 @@
 """Shared by several kinds of rules.
 
-Shapes: `N` seeds, `R` resamples, `F` fractions or coefficients.
+Shapes: `N` seeds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from scipy.stats import rankdata
 
 from codesign_bench import stats
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import InsufficientData
+from codesign_bench.storage.reference_points import references
 
-OVER_SEEDS = "the 95 % bootstrap interval over seeds"
+T_INTERVAL = "the 95 % t interval over seeds"
+WELCH_INTERVAL = "the 95 % Welch interval"
+LEAST_SHARE = 0.05
+"""Smallest effect that counts, as a share of its scale: with less, one would not choose a method for it (ours)."""
+EFFECT_SCALE = (
+    "the task's scale (best known minus idle return; without reference points, the largest mean return of a method)"
+)
+"""Words for `effect_scale`."""
 BUDGET_TOLERANCE = 0.1
 """Budgets count as equal up to this relative difference in environment steps, since batches overshoot slightly."""
 FEWEST_LEVELS = 3
 """Fewest fractions or coefficients for a trend."""
-
-Statistic = Callable[..., np.ndarray]
-"""Takes resampled samples (R, N, ...) and returns (R,)."""
 
 
 def run_command(method: str, task: str, seeds: int, more: str = "") -> str:
@@ -33,40 +38,28 @@ def run_command(method: str, task: str, seeds: int, more: str = "") -> str:
     return f"codesign-bench run --method {method} --task {task}{more} --seeds {seeds}{{profile}} --out {{results}}"
 
 
-def estimate(
-    samples: Sequence[np.ndarray], statistic: Statistic, rng: np.random.Generator
-) -> tuple[float, float, float]:
-    """Return a statistic of samples (N, ...) and the ends of its bootstrap interval over seeds."""
-    low, high = stats.bootstrap(samples, statistic, rng)
-    return float(statistic(*(sample[None] for sample in samples))[0]), float(low), float(high)
+def effect_scale(evidence: Evidence, task: str) -> float:
+    """Return the difference of returns that counts as 1 on a task.
 
+    It is the range of normalised scores, the best known return minus that of an idle policy with random tools, if the
+    results have both reference points. Otherwise it is the largest absolute mean final return of a method.
 
-def mean(sample: np.ndarray) -> np.ndarray:
-    """Return the means (R,) of samples (R, N)."""
-    return np.asarray(sample.mean(axis=1))
-
-
-def difference(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return the differences (R,) of the means of two samples (R, N)."""
-    return mean(first) - mean(second)
-
-
-def trend(levels: Sequence[float]) -> Statistic:
-    """Return Spearman's rank correlation of F levels with the means of F samples, as a function of the samples.
-
-    It is 0 if all means are equal.
+    Raises:
+        InsufficientData: there are no reference points, and no method has enough finished seeds and any return.
     """
-
-    def correlation(*samples: np.ndarray) -> np.ndarray:
-        # Pearson's correlation of ranks, for all resamples at once. Ranks instead of values, since a claim about a
-        # trend is about its direction, and one extreme seed must not decide it.
-        ranks = rankdata([mean(sample) for sample in samples], axis=0)  # (F, R)
-        ranks = ranks - ranks.mean(axis=0)
-        order = rankdata(levels) - rankdata(levels).mean()
-        scale = np.sqrt((order**2).sum() * (ranks**2).sum(axis=0))
-        return np.divide(order @ ranks, scale, out=np.zeros_like(scale), where=scale > 0.0)
-
-    return correlation
+    known = references(evidence.references).get(task)
+    if known is not None and known.one > known.zero:
+        return known.one - known.zero
+    means = []
+    for method in evidence.methods(task):
+        try:
+            means.append(abs(float(evidence.final_returns(task, method).mean())))
+        except InsufficientData:
+            continue
+    scale = max(means, default=0.0)
+    if not scale > 0.0:
+        raise InsufficientData(f"no method has a return on {task} to measure differences by")
+    return scale
 
 
 def at_each(levels: Sequence[float], read: Callable[[float], np.ndarray]) -> dict[float, np.ndarray]:
@@ -84,6 +77,28 @@ def at_each(levels: Sequence[float], read: Callable[[float], np.ndarray]) -> dic
     if len(found) < FEWEST_LEVELS:
         raise InsufficientData(reasons[0])
     return found
+
+
+def largest_of(steps: Sequence[stats.Estimate], wider: Sequence[stats.Estimate], threshold: float) -> stats.Estimate:
+    """Return the largest of several true values with its interval and the p-value against `threshold`.
+
+    All are below the threshold only if each is: the largest p-value of those says so, without any correction. One above
+    is found among several tries: the smallest p-value, times their number, says so. In the same way the upper end is
+    the largest of all, and the lower end the largest of intervals that are each wider.
+
+    Args:
+        steps: each value with its 95 % interval and its two-sided p-value against the threshold.
+        wider: the same with intervals of confidence 1 - 0.05 / (number of steps).
+        threshold: what p-values are against.
+    """
+    if any(math.isnan(step.p) for step in steps):
+        return stats.Estimate(max(step.value for step in steps))
+    value = max(step.value for step in steps)
+    low, high = max(step.low for step in wider), max(step.high for step in steps)
+    if value < threshold:
+        return stats.Estimate(value, low, high, max(step.p for step in steps))
+    beyond = min(step.p for step in steps if step.value >= threshold)
+    return stats.Estimate(value, low, high, min(1.0, len(steps) * beyond))
 
 
 def check_budgets(evidence: Evidence, task: str, *sides: tuple[str, Variant]) -> None:
@@ -112,7 +127,7 @@ def seeds_of(*samples: np.ndarray) -> str:
     return " and ".join(str(len(sample)) for sample in samples) + " seeds"
 
 
-def seeds_at_each(found: dict[float, np.ndarray]) -> str:
+def seeds_at_each(found: Mapping[float, np.ndarray]) -> str:
     """Return the levels and their numbers of seeds as text."""
     counts = sorted({len(sample) for sample in found.values()})
     seeds = "-".join(str(count) for count in dict.fromkeys((counts[0], counts[-1])))

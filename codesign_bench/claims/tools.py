@@ -10,14 +10,17 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
+from codesign_bench import stats
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, InsufficientData, above
-from codesign_bench.claims.statistics import OVER_SEEDS, estimate, mean, run_command, seeds_of
+from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, InsufficientData, above, reason
+from codesign_bench.claims.statistics import T_INTERVAL, run_command, seeds_of
 from codesign_bench.evaluation.sensitivity import measure_missing
 
 GOAL_SHARE = 0.1
 """Tools vary with the goal if goals explain more than this fraction of their variance (ours)."""
+FLOOR = 0.01
+"""Standard deviation over goals, in widths of the ranges, below which tools differ only by rounding (ours)."""
 FEWEST_TOOLS = 50
 """Fewest tried tools for a statement about tools in general (ours)."""
 
@@ -26,17 +29,21 @@ def tools_vary(task: str, method: str, seeds: int) -> Rule:
     """Return the rule for "`method` designs different tools for different goals of `task`"."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
+        del rng  # nothing is drawn
         rows = evidence.instances(task, method)
         if task not in evidence.design_widths:
             raise InsufficientData(f"the task '{task}' is unknown")
         shares = goal_shares(rows, evidence.design_widths[task])
-        value, low, high = estimate([shares], mean, rng)
-        return Finding(above(low, high, GOAL_SHARE), value, low, high, seeds_of(shares))
+        found = stats.one_sample_t(shares, GOAL_SHARE)
+        low, high = np.clip([found.low, found.high], 0.0, 1.0).tolist()
+        told = reason(found, GOAL_SHARE)
+        return Finding(above(found, GOAL_SHARE), found.value, low, high, seeds_of(shares), told, found.p)
 
     return Rule(
-        kind="tools vary with the goal",
+        kind="goals tell tools apart",
         statistic="variance of designs over goals, as a share of their variance over goals and seeds",
-        words=f"supported if {OVER_SEEDS} lies above {GOAL_SHARE:g}, contradicted if below {GOAL_SHARE:g}",
+        words=f"supported if {T_INTERVAL}, cut off at 0 and 1, is above {GOAL_SHARE:g}, contradicted if below "
+        f"{GOAL_SHARE:g}; a spread over goals below {FLOOR:.0%} of the ranges counts as none",
         needs=(run_command("all", task, seeds),),
         judge=judge,
     )
@@ -45,7 +52,7 @@ def tools_vary(task: str, method: str, seeds: int) -> Rule:
 def goal_shares(rows: pd.DataFrame, widths: Mapping[str, float]) -> np.ndarray:
     """Return (N,): each seed's variance of designs over goals, divided by the variance over all goals and seeds.
 
-    Variances are summed over design parameters, each in units of the width of its range; 0 if there is no variance.
+    Variances are summed over design parameters, each in units of the width of its range; below `FLOOR` the share is 0.
 
     Args:
         rows: one row per seed and goal, with the columns named in `widths`.
@@ -58,6 +65,7 @@ def goal_shares(rows: pd.DataFrame, widths: Mapping[str, float]) -> np.ndarray:
     # Seeds that agree on one tool for all goals have no variance within seeds; seeds that find different but constant
     # tools have only variance between them, which the total contains and this does not.
     within = units.groupby(rows["seed"]).var(ddof=0).sum(axis=1).to_numpy()
+    within = np.where(within < FLOOR**2, 0.0, within)
     return within / total if total > 0.0 else np.zeros_like(within)
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -14,7 +14,16 @@ from rich.console import Console
 from codesign_bench import __version__, stats
 from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.evidence import Evidence, load_evidence
-from codesign_bench.claims.finding import CONTRADICTED, NOT_ASKED, UNDECIDED, VERDICTS, Finding, InsufficientData
+from codesign_bench.claims.finding import (
+    CONTRADICTED,
+    LEVEL,
+    NOT_ASKED,
+    UNDECIDED,
+    VERDICTS,
+    Finding,
+    InsufficientData,
+    probability,
+)
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.console import Log, print_table, printer
 from codesign_bench.errors import UserError
@@ -26,7 +35,10 @@ from codesign_bench.text_tables import markdown
 
 MARKDOWN_FILE, JSON_FILE = "claims.md", "claims.json"
 SEED = 0
-"""Seed of the bootstrap. Each claim has a separate random stream, so a new claim does not change other intervals."""
+"""Seed of permutations. Each claim has a separate random stream, so a new claim does not change other p-values."""
+
+STATISTIC, P_VALUES = "statistic [95 % interval]", ("p", "adjusted p (claims)")
+"""Headings of tables."""
 
 
 class Claimant(Protocol):
@@ -69,10 +81,37 @@ class Row:
             return value
         return f"{value} [{_number(self.finding.low)}, {_number(self.finding.high)}]"
 
+    @property
+    def p_values(self) -> tuple[str, str]:
+        """The p-value of this claim only, and the one adjusted for its family with the family's size, as text."""
+        if math.isnan(self.finding.p):
+            return "", ""
+        return probability(self.finding.p), f"{probability(self.finding.p_adjusted)} ({self.finding.family_size})"
+
 
 def judge(claims: Sequence[Claim], evidence: Evidence, results: str) -> list[Row]:
-    """Judge each claim; `results` is the folder in commands for missing data."""
-    return [_row(claim, evidence, results) for claim in claims]
+    """Judge each claim, then adjust p-values within each kind of rule (Holm).
+
+    Args:
+        claims: the claims that are judged together.
+        evidence: their data.
+        results: the folder in commands for missing data.
+    """
+    return adjusted([_row(claim, evidence, results) for claim in claims])
+
+
+def adjusted(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows with p-values adjusted for all claims with the same kind of rule."""
+    families = defaultdict(list)
+    for index, row in enumerate(rows):
+        if not math.isnan(row.finding.p):
+            families[row.claim.rule.kind].append(index)
+    result = list(rows)
+    for family in families.values():
+        adjusted_p = stats.holm([rows[index].finding.p for index in family])
+        for index, p in zip(family, adjusted_p, strict=True):
+            result[index] = replace(rows[index], finding=rows[index].finding.adjusted(float(p), len(family)))
+    return result
 
 
 def _row(claim: Claim, evidence: Evidence, results: str) -> Row:
@@ -119,24 +158,42 @@ def _measure(claims: Sequence[Claim], evidence: Evidence, results: Path, log: Lo
 
 
 def print_rows(rows: Sequence[Row], console: Console) -> None:
-    """Print one line per claim that is asked, those without data last, then counts and commands for missing data."""
+    """Print one line per claim that is asked, then counts and commands for missing data.
+
+    Checks of the scenes come after the other claims, claims without data last.
+    """
     log = printer(console)
-    ordered = sorted((row for row in rows if row.asked), key=lambda row: bool(row.needs))
-    table = [(row.finding.verdict, row.claim.name, row.interval, row.finding.n, row.finding.note) for row in ordered]
-    print_table(console, ("verdict", "claim", "statistic [95 % interval]", "n", "note"), table)
+    ordered = sorted((row for row in rows if row.asked), key=lambda row: (bool(row.needs), row.claim.check_of_scene))
+    table = [
+        (row.finding.verdict, row.claim.name, row.interval, *row.p_values, row.finding.n, row.finding.note)
+        for row in ordered
+    ]
+    print_table(console, ("verdict", "claim", STATISTIC, *P_VALUES, "n", "note"), table)
     for line in (summary(rows), *(f"needs: {command}" for command in missing(rows))):
         log(line)
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """Return the counts of verdicts as one line."""
+    """Return the counts of verdicts as one line, those of checks of the scenes after the others."""
     asked = [row for row in rows if row.asked]
-    counts = Counter(row.finding.verdict for row in asked)
+    found, checks = apart(asked)
     lacking = sum(bool(row.needs) for row in asked)
-    verdicts = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS)
+    told = f"{len(found)} claims: {_counted(found)}"
+    told += f"; {len(checks)} checks of the scenes: {_counted(checks)}" if checks else ""
     tasks = dict.fromkeys(task for row in rows if not row.asked for task in row.claim.tasks)
     others = f"; {len(rows) - len(asked)} more not asked, without results of all of {', '.join(tasks)}" if tasks else ""
-    return f"{len(asked)} claims: {verdicts} ({lacking} of them for lack of data){others}"
+    return f"{told} ({lacking} undecided for lack of data){others}"
+
+
+def apart(rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
+    """Return the rows that may find something out, and those that check the scenes."""
+    found = [row for row in rows if not row.claim.check_of_scene]
+    return found, [row for row in rows if row.claim.check_of_scene]
+
+
+def _counted(rows: Sequence[Row]) -> str:
+    counts = Counter(row.finding.verdict for row in rows)
+    return ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS)
 
 
 def missing(rows: Sequence[Row]) -> list[str]:
@@ -162,60 +219,58 @@ def write_rows(rows: Sequence[Row], study: Claimant, results: Path, out: Path, m
 
 def as_json(rows: Sequence[Row], study: Claimant, results: Path, made: Sequence[str] = ()) -> dict[str, Any]:
     """Return everything that is known of each claim, as JSON values; what is not finite is None or text."""
+    found, checks = apart(rows)
     return {
         "version": __version__,
         "study": study.name,
         "results": str(results),
         "made": list(made),
-        "interval": {"kind": "percentile bootstrap", "confidence": stats.CONFIDENCE, "resamples": stats.RESAMPLES},
-        "claims": [
-            {
-                "name": row.claim.name,
-                "sentence": row.claim.sentence,
-                "source": row.claim.source,
-                "tasks": list(row.claim.tasks),
-                "rule": row.claim.rule.kind,
-                "statistic": row.claim.rule.statistic,
-                "words": row.claim.rule.words,
-                "verdict": row.finding.verdict,
-                "value": _json_number(row.finding.value),
-                "low": _json_number(row.finding.low),
-                "high": _json_number(row.finding.high),
-                "n": row.finding.n,
-                "note": row.finding.note,
-                "needs": list(row.needs),
-            }
-            for row in rows
-        ],
+        "interval": {"confidence": stats.CONFIDENCE},
+        "adjustment": {"method": "Holm", "level": LEVEL, "family": "claims of one rule that have a p-value"},
+        "claims": [_entry(row) for row in found],
+        "checks_of_scenes": [_entry(row) for row in checks],
+    }
+
+
+def _entry(row: Row) -> dict[str, Any]:
+    return {
+        "name": row.claim.name,
+        "sentence": row.claim.sentence,
+        "source": row.claim.source,
+        "tasks": list(row.claim.tasks),
+        "rule": row.claim.rule.kind,
+        "statistic": row.claim.rule.statistic,
+        "words": row.claim.rule.words,
+        "verdict": row.finding.verdict,
+        "value": _json_number(row.finding.value),
+        "low": _json_number(row.finding.low),
+        "high": _json_number(row.finding.high),
+        "p": _json_number(row.finding.p),
+        "p_adjusted": _json_number(row.finding.p_adjusted),
+        "family_size": row.finding.family_size,
+        "n": row.finding.n,
+        "note": row.finding.note,
+        "needs": list(row.needs),
     }
 
 
 def as_markdown(rows: Sequence[Row], study: Claimant, results: Path, made: Sequence[str] = ()) -> str:
-    """Return the page: the table of claims, the rules that judged them, and the commands for missing data."""
+    """Return the page: the tables of claims, the rules that judged them, and the commands for missing data."""
     asked = [row for row in rows if row.asked]
-    header = ("claim", "verdict", "statistic [95 % interval]", "n", "rule", "source", "note")
-    table = [
-        (
-            row.claim.sentence,
-            f"*{row.finding.verdict}*",
-            row.interval,
-            row.finding.n,
-            row.claim.rule.kind,
-            row.claim.source,
-            "; ".join([row.finding.note, *(f"needs: `{command}`" for command in row.needs)]),
-        )
-        for row in asked
-    ]
+    found, checks = apart(asked)
     rules = {row.claim.rule.kind: (row.claim.rule.statistic, row.claim.rule.words) for row in asked}
     parts = [
         f"# {study.title}: what the results say of its claims\n",
-        f"Results: `{results}`. {summary(rows)}. Intervals are 95 % percentile bootstrap intervals over seeds "
-        f"({stats.RESAMPLES:,} resamples); below {stats.MIN_SEEDS} seeds there is none and nothing is decided.\n",
+        f"Results: `{results}`. {summary(rows)}. {HOW_SURE}\n",
         by_rule(asked),
         "## Contradicted\n",
-        contradicted(rows),
+        contradicted(asked),
         "## Every claim\n",
-        markdown(header, table),
+        _claims_table(found),
+    ]
+    if checks:
+        parts += ["## Checks of the scenes\n", f"{SCENES}\n", _claims_table(checks)]
+    parts += [
         "## Rules\n",
         markdown(("rule", "statistic", "verdict"), [(kind, *words) for kind, words in rules.items()]),
     ]
@@ -226,12 +281,46 @@ def as_markdown(rows: Sequence[Row], study: Claimant, results: Path, made: Seque
     return "\n".join(parts)
 
 
+HOW_SURE = (
+    "p-values are two-sided. The adjusted ones account by Holm's method for all claims of the same rule, whose number "
+    f"is in brackets; a verdict that follows from a test needs one below {LEVEL:g}. Fewer than {stats.MIN_SEEDS} seeds "
+    "give no interval and decide nothing."
+)
+SCENES = (
+    "The scenes were chosen so that one tool does not serve all goals. That no single tool does, and that methods with "
+    "one tool for all goals fall behind, shows that the scenes are as intended; it is no discovery about a method."
+)
+
+
+def _claims_table(rows: Sequence[Row]) -> str:
+    header = ("claim", "verdict", STATISTIC, *P_VALUES, "n", "rule", "source", "note")
+    table = [
+        (
+            row.claim.sentence,
+            f"*{row.finding.verdict}*",
+            row.interval,
+            *row.p_values,
+            row.finding.n,
+            row.claim.rule.kind,
+            row.claim.source,
+            "; ".join(filter(None, [row.finding.note, *(f"needs: `{command}`" for command in row.needs)])),
+        )
+        for row in rows
+    ]
+    return markdown(header, table)
+
+
 def by_rule(rows: Sequence[Row]) -> str:
-    """Return a Markdown table with the number of claims per rule and verdict."""
-    kinds = dict.fromkeys(row.claim.rule.kind for row in rows)
-    found = Counter((row.claim.rule.kind, row.finding.verdict) for row in rows)
-    table = [(kind, *(str(found[kind, verdict]) for verdict in VERDICTS)) for kind in kinds]
+    """Return a Markdown table with the number of claims per rule and verdict, checks of the scenes last."""
+    found, checks = apart(rows)
+    table = [*_by_rule(found, ""), *_by_rule(checks, " (check of the scene)")]
     return markdown(("rule", *VERDICTS), table)
+
+
+def _by_rule(rows: Sequence[Row], mark: str) -> list[tuple[str, ...]]:
+    counts = Counter((row.claim.rule.kind, row.finding.verdict) for row in rows)
+    kinds = dict.fromkeys(row.claim.rule.kind for row in rows)
+    return [(f"{kind}{mark}", *(str(counts[kind, verdict]) for verdict in VERDICTS)) for kind in kinds]
 
 
 def contradicted(rows: Sequence[Row]) -> str:

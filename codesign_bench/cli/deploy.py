@@ -53,6 +53,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
     from codesign_bench.deployment.conditions import TRIAL, Conditions
     from codesign_bench.deployment.deploy import Order, deploy
+    from codesign_bench.storage.cells import open_cell
     from codesign_bench.storage.policies import policy_and_task
 
     if options.protocol and (options.tool or options.trials is not None):
@@ -60,6 +61,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     given = {name: getattr(options, name) for name in CONDITIONS if getattr(options, name) is not None}
     conditions = replace(TRIAL if options.protocol else Conditions(), **given)
     conditions.check()
+    policy, task = policy_and_task(options.policy, options.task)
     order = Order(
         conditions,
         tools=tuple(options.tool),
@@ -67,7 +69,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         protocol=options.protocol,
         seed=options.seed,
         gifs=not options.no_gifs,
+        policy_seed=open_cell(options.policy).record.seed,
     )
-    policy, task = policy_and_task(options.policy, options.task)
     deploy(task, policy, order, options.out, printer(console), str(options.policy))
     return 0

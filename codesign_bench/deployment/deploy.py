@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,11 @@ from codesign_bench.deployment.rollout import Deployment
 from codesign_bench.deployment.tables import (
     FOLDER,
     PICTURES_FOLDER,
-    PROTOCOL_FILE,
+    SEED,
+    SOLVED_IN_TRAINING,
     SUMMARY_SUFFIX,
     TRIALS_FILE,
+    protocol_file,
     row,
     summarise,
 )
@@ -25,7 +27,8 @@ from codesign_bench.errors import UserError
 from codesign_bench.seeding import generator
 from codesign_bench.storage.files import write_bytes, write_json
 from codesign_bench.storage.layout import open_folder, write_rows
-from codesign_bench.task import Behaviour, Task, deployment_of
+from codesign_bench.task import Behaviour, Floats, Task, deployment_of
+from codesign_bench.task.robot import IDEAL
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,8 @@ class Order:
     seed: int = 0
     gifs: bool = True
     """Whether to draw every trial."""
+    policy_seed: int = 0
+    """The seed that the policy was trained with."""
 
 
 def deploy(
@@ -69,9 +74,10 @@ def deploy(
     deployment = Deployment(task, policy, order.conditions)
     open_folder(out)
     folder = out / FOLDER / task.name
-    path = folder / (PROTOCOL_FILE if order.protocol else TRIALS_FILE)
+    path = folder / (protocol_file(order.policy_seed) if order.protocol else TRIALS_FILE)
     (folder / PICTURES_FOLDER).mkdir(parents=True, exist_ok=True)
     unit_designs = {tool: deployment.unit_design(settings.own[tool - 1]) for tool in tools}
+    in_training = _solved_in_training(task, policy, order, unit_designs)
     designs: dict[str, dict[str, float]] = {}
     rows = []
     for trial in planned:
@@ -81,6 +87,7 @@ def deploy(
         values = deployment.episodes.designs[0].tolist()
         designs[str(trial.tool)] = dict(zip(task.design_space.names, values, strict=True))
         where = {name: getattr(trial, name) for name in ("kind", "tool", "trial", "row", "column")}
+        where |= {SEED: order.policy_seed, SOLVED_IN_TRAINING: in_training[trial.tool]}
         rows.append(row(task, settings, trial.instance, rollout, **where))
         if film is not None:
             write_bytes(folder / PICTURES_FOLDER / f"{trial.name}.gif", film.gif(task.control_period))
@@ -101,6 +108,19 @@ def deploy(
     )
     say(str(path))
     return rows
+
+
+def _solved_in_training(
+    task: Task, policy: Behaviour, order: Order, unit_designs: Mapping[int, Floats]
+) -> dict[int, int]:
+    """Return for each tool whether the policy solves its own instance with the gantry of training, without noise.
+
+    A trial has fewer steps than an episode of training; here it has as many as on the arm.
+    """
+    gantry = Deployment(task, policy, Conditions(arm=IDEAL))
+    own = deployment_of(task).trials.own
+    rng = generator(order.seed, f"deploy {task.name} in training physics")  # draws nothing: nothing is perturbed
+    return {tool: int(gantry.play(own[tool - 1], design, rng).success) for tool, design in unit_designs.items()}
 
 
 def _line(trial: Trial, values: dict[str, Any]) -> str:

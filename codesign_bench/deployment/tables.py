@@ -16,8 +16,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FOLDER = "deployment"
-PROTOCOL_FILE, TRIALS_FILE = "protocol.csv", "trials.csv"
-"""Tables of the paper's full protocol, and of trials chosen by a user."""
+PROTOCOL_FILES, TRIALS_FILE = "protocol*.csv", "trials.csv"
+"""Tables of the paper's full protocol, one per policy, and of trials chosen by a user."""
+SEED, SOLVED_IN_TRAINING = "policy_seed", "solved_in_training"
+"""Columns: the seed of the policy, and whether it solves the tool's own instance with the gantry of training."""
 SUMMARY_SUFFIX = ".json"
 PICTURES_FOLDER = "rollouts"
 OWN, GRID = "own", "grid"
@@ -46,6 +48,11 @@ def row(task: Task, trials: RobotTrials, instance: Floats, rollout: Rollout, **w
     }
 
 
+def protocol_file(policy_seed: int) -> str:
+    """Return the name of the file with a policy's trials; that of seed 0 has the name of the first version."""
+    return "protocol.csv" if policy_seed == 0 else f"protocol-seed-{policy_seed:02d}.csv"
+
+
 def summarise(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return successes, incidents and tracking errors of each kind of trial and tool."""
     result = []
@@ -70,17 +77,21 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def load_deployment(results: str | Path) -> pd.DataFrame:
-    """Return the trials of the paper's protocol below `results`, one row each, for all tasks.
+    """Return the trials of the paper's protocol below `results`, one row each, for all tasks and policies.
+
+    Trials of version 0.1.0 have no seed of the policy; it was 0.
 
     Raises:
         UserError: there are none.
     """
     import pandas as pd
 
-    paths = sorted(Path(results).glob(f"{FOLDER}/*/{PROTOCOL_FILE}"))
+    paths = sorted(Path(results).glob(f"{FOLDER}/*/{PROTOCOL_FILES}"))
     if not paths:
         raise UserError(
             f"no deployment in '{results}' yet; create one with: codesign-bench deploy --policy CELL --protocol "
             f"--out {results}"
         )
-    return pd.concat([pd.read_csv(path) for path in paths], ignore_index=True)
+    trials = pd.concat([pd.read_csv(path) for path in paths], ignore_index=True)
+    seeds = trials[SEED] if SEED in trials.columns else pd.Series(0.0, index=trials.index)
+    return trials.assign(**{SEED: seeds.fillna(0).astype(int)})

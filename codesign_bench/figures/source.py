@@ -72,10 +72,11 @@ def timing(request: Request) -> pd.DataFrame:
 
 
 def trials_on_an_arm(request: Request) -> pd.DataFrame:
-    """Return the trials of deployed policies."""
-    from codesign_bench.deployment.tables import load_deployment
+    """Return the trials of one deployed policy for each task, that of the lowest seed."""
+    from codesign_bench.deployment.tables import SEED, load_deployment
 
-    return load_deployment(request.results)
+    trials = load_deployment(request.results)
+    return trials[trials[SEED] == trials.groupby("task")[SEED].transform("min")]
 
 
 def tasks_in(results: Path) -> list[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codesign_bench.claims.evidence import load_evidence
-from codesign_bench.claims.verify import Row, judge, missing, summary
+from codesign_bench.claims.verify import P_VALUES, STATISTIC, Row, apart, judge, missing, summary
 from codesign_bench.errors import UserError
 from codesign_bench.study.study import Study
 
@@ -21,6 +21,8 @@ class ClaimsPart:
     summary: str
     table: Table | None
     """The claims with data; None if there are none."""
+    checks: Table | None
+    """The same for claims that check the scenes."""
     rules: Table | None
     """How these claims were judged."""
     lacking: Table | None
@@ -34,28 +36,19 @@ def claims_part(results: Path, study: Study) -> ClaimsPart:
     try:
         return part(judge(study.claims(), load_evidence(results), str(results)))
     except UserError as error:  # no finished cell yet, or an unreadable table
-        return ClaimsPart(f"No claim was judged: {error}", None, None, None, [])
+        return ClaimsPart(f"No claim was judged: {error}", None, None, None, None, [])
 
 
 def part(rows: Sequence[Row]) -> ClaimsPart:
     """Return judged claims for the page: those with data first, those without below, collapsed."""
     with_data = [row for row in rows if not row.needs]
     without = [row for row in rows if row.asked and row.needs]
-    found = [
-        (
-            row.finding.verdict,
-            row.claim.sentence,
-            row.interval,
-            row.finding.n or NOTHING,
-            row.claim.rule.kind,
-            row.finding.note,
-        )
-        for row in with_data
-    ]
+    found, checks = ([_shown(row) for row in rows] for rows in apart(with_data))
     rules = {row.claim.rule.kind: (row.claim.rule.statistic, row.claim.rule.words) for row in with_data}
     return ClaimsPart(
         summary=summary(rows) + ".",
-        table=Table(("verdict", "claim", "statistic [95 % interval]", "of", "rule", "note"), found) if found else None,
+        table=_table(found),
+        checks=_table(checks),
         rules=Table(("rule", "statistic", "verdict"), [(kind, *told) for kind, told in rules.items()])
         if rules
         else None,
@@ -64,3 +57,13 @@ def part(rows: Sequence[Row]) -> ClaimsPart:
         else None,
         commands=missing(rows),
     )
+
+
+def _shown(row: Row) -> tuple[str, ...]:
+    found = row.finding
+    n, rule = found.n or NOTHING, row.claim.rule.kind
+    return found.verdict, row.claim.sentence, row.interval, *row.p_values, n, rule, found.note
+
+
+def _table(rows: Sequence[tuple[str, ...]]) -> Table | None:
+    return Table(("verdict", "claim", STATISTIC, *P_VALUES, "of", "rule", "note"), rows) if rows else None

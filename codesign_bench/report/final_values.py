@@ -1,6 +1,6 @@
 """Final results of each method with their uncertainty: the first part of the page.
 
-Only finished cells count. Intervals are bootstrap intervals over seeds (`stats.py`).
+Only finished cells count. Intervals over seeds are Student's for a mean and Welch's for a difference.
 """
 
 from __future__ import annotations
@@ -12,25 +12,20 @@ import numpy as np
 import pandas as pd
 
 from codesign_bench.registry import in_order
-from codesign_bench.seeding import generator
 from codesign_bench.stats import (
     CELL_KEYS,
     MIN_SEEDS,
-    final_rng,
     final_values,
-    interquartile_mean,
     mean,
-    mean_difference_interval,
-    mean_interval,
+    mean_t_interval,
     probability_of_improvement,
+    welch,
 )
 from codesign_bench.storage.records import DONE
 
 from .cells import PageCell, variants
 from .tables import NOTHING, number
 
-SEED = 0
-"""Seed of the bootstrap; every interval has a separate random stream."""
 SAME_BUDGET = 0.02
 """Largest relative difference in steps between seeds with the same budget."""
 STRIP_WIDTH, STRIP_MARGIN = 160.0, 6.0
@@ -43,10 +38,9 @@ class Estimate:
 
     values: tuple[float, ...]
     mean: float
-    interquartile_mean: float
     low: float
     high: float
-    """The 95 % bootstrap interval of the mean; NaN for fewer than three seeds."""
+    """The 95 % t interval of the mean; NaN for fewer than three seeds, or if all are equal."""
 
     @property
     def has_interval(self) -> bool:
@@ -119,17 +113,17 @@ def task_results(cells: Sequence[PageCell], curves: pd.DataFrame) -> list[TaskRe
     ]
 
 
-def estimate(values: Sequence[float], rng: np.random.Generator) -> Estimate:
-    """Return means and interval of (N,) values; `rng` draws the interval's resamples."""
-    low, high = mean_interval(values, rng)
-    return Estimate(tuple(values), mean(values), interquartile_mean(values), low, high)
+def estimate(values: Sequence[float], *, within: tuple[float, float] = (-np.inf, np.inf)) -> Estimate:
+    """Return mean and interval of (N,) values, which cannot be but `within`."""
+    low, high = mean_t_interval(values, within=within)
+    return Estimate(tuple(values), mean(values), low, high)
 
 
 def strip(shown: Estimate, axis: tuple[float, float]) -> Strip:
-    """Return the positions of the marks of an estimate on an axis from `axis[0]` to `axis[1]`."""
+    """Return the positions of the marks of an estimate on an axis from `axis[0]` to `axis[1]`, which ends intervals."""
 
     def place(value: float) -> float:
-        share = (value - axis[0]) / (axis[1] - axis[0]) if axis[1] > axis[0] else 0.5
+        share = (min(max(value, axis[0]), axis[1]) - axis[0]) / (axis[1] - axis[0]) if axis[1] > axis[0] else 0.5
         return round(STRIP_MARGIN + share * (STRIP_WIDTH - 2.0 * STRIP_MARGIN), 1)
 
     interval = (place(shown.low), place(shown.high)) if shown.has_interval else (0.0, 0.0)
@@ -143,13 +137,15 @@ def verdict(estimates: Sequence[tuple[str, Estimate]]) -> str:
         return "Only one method: nothing to compare it with."
     (first, best), (second, next_best) = ranked[:2]
     lead = f"Highest final return: {first}, {best.text}; next: {second}, {next_best.text}."
-    if not (best.has_interval and next_best.has_interval):
+    if min(len(best.values), len(next_best.values)) < MIN_SEEDS:
         return f"{lead} With fewer than {MIN_SEEDS} seeds there is no interval, and no ranking."
-    low, high = mean_difference_interval(best.values, next_best.values, generator(SEED, f"report {first} {second}"))
+    found = welch(best.values, next_best.values)
+    if np.isnan(found.low):
+        return f"{lead} Seeds do not differ, so there is no interval: their spread is unknown."
     share = probability_of_improvement([(best.values, next_best.values)])
-    difference = f"{number(best.mean - next_best.mean)} [{number(low)}, {number(high)}]"
+    difference = f"{number(found.value)} [{number(found.low)}, {number(found.high)}]"
     told = f"Difference: {difference}; the first is higher in {share:.0%} of pairs of seeds."
-    return f"{lead} {told} {'The first is ahead.' if low > 0.0 else 'The interval contains 0: it may be chance.'}"
+    return f"{lead} {told} {'The first is ahead.' if found.low > 0.0 else 'The interval contains 0: it may be chance.'}"
 
 
 def _task_result(cells: Sequence[PageCell], task: str, variant: str, final: pd.DataFrame) -> TaskResult:
@@ -159,10 +155,8 @@ def _task_result(cells: Sequence[PageCell], task: str, variant: str, final: pd.D
     methods, returns = [], []
     for method in in_order("methods", final["method"]):
         rows, of_method = final[final["method"] == method], [cell for cell in group if cell.method == method]
-        earned, solved = (
-            estimate(rows[column].tolist(), final_rng(task, method, variant, column))
-            for column in ("return_mean", "success_rate")
-        )
+        earned = estimate(rows["return_mean"].tolist())
+        solved = estimate(rows["success_rate"].tolist(), within=(0.0, 1.0))
         returns.append((of_method[0].label, earned))
         methods.append(
             MethodResult(

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from scipy.stats import trim_mean
 
-from codesign_bench.stats.bootstrap import bootstrap, interquartile_means
 from codesign_bench.stats.summaries import mean, standard_error
 
 CELL_KEYS = ["task", "method", "variant"]
@@ -73,29 +71,3 @@ def curve_statistics(frame: pd.DataFrame, column: str) -> pd.DataFrame:
     """
     grouped = on_common_grid(frame, column).groupby([*CELL_KEYS, "env_steps"])[column]
     return grouped.agg(mean=mean, standard_error=standard_error, seeds="count").reset_index()
-
-
-def curve_intervals(frame: pd.DataFrame, column: str, rng: np.random.Generator) -> pd.DataFrame:
-    """Return interquartile mean, its bootstrap interval and number of seeds of `column`, along the environment steps.
-
-    Whole curves are resampled: a resample has the same seeds at all steps that the same seeds reached.
-
-    Returns:
-        Columns task, method, variant, env_steps, interquartile_mean, low, high (NaN below three seeds), seeds.
-    """
-    parts = []
-    for keys, group in on_common_grid(frame, column).groupby(CELL_KEYS):
-        # Seeds may end at different steps. Stretches with the same set of seeds are resampled as whole curves: drawing
-        # seeds anew at every step would make the interval jump between neighbouring steps.
-        curves = group.pivot(index="env_steps", columns="seed", values=column)
-        for reached, stretch in curves.groupby([curves[seed].notna() for seed in curves]):
-            values = stretch.to_numpy()[:, np.array(reached)].T
-            low, high = bootstrap([values], interquartile_means, rng)
-            table = {
-                "env_steps": stretch.index,
-                "interquartile_mean": trim_mean(values, 0.25),
-                "low": low,
-                "high": high,
-            }
-            parts.append(pd.DataFrame({**dict(zip(CELL_KEYS, keys, strict=True)), **table, "seeds": len(values)}))
-    return pd.concat(parts).sort_values([*CELL_KEYS, "env_steps"], kind="stable", ignore_index=True)

@@ -2,7 +2,7 @@
 
 Shapes: `N` and `M` seeds, `L` levels, `P` permutations. If methods do not differ, each way of dealing out the scores to
 the methods is equally probable; the p-value is the share of ways in which the statistic is at least as extreme. All
-ways are tried where there are at most `MOST` of them; otherwise as many are drawn, and the observed one is counted
+ways are tried if there are at most `MOST` of them; otherwise as many are drawn, and the observed one is counted
 among them, so that the test errs on the safe side.
 """
 
@@ -37,7 +37,7 @@ def stratified_p(pairs: Sequence[tuple[ArrayLike, ArrayLike]], rng: np.random.Ge
 
     Args:
         pairs: per task, the scores of two methods, (N,) and (M,).
-        rng: draws permutations where there are too many to try all.
+        rng: draws permutations if there are too many to try all.
 
     Returns:
         The p-value; NaN if a method has no score on some task. A task on which all scores are equal says nothing.
@@ -89,7 +89,7 @@ def sign_flip_p(differences: ArrayLike, rng: np.random.Generator) -> float:
     return _share_as_extreme(np.abs(signs @ array))
 
 
-def jonckheere_p(samples: Sequence[ArrayLike], rng: np.random.Generator) -> tuple[float, float]:
+def jonckheere_p(samples: Sequence[ArrayLike], rng: np.random.Generator, *, same: float = 0.0) -> tuple[float, float]:
     """Return the direction and the two-sided p-value of a trend over L ordered levels (Jonckheere 1954).
 
     The statistic counts, over all pairs of levels, the pairs of seeds in which the higher level has the higher score,
@@ -98,6 +98,7 @@ def jonckheere_p(samples: Sequence[ArrayLike], rng: np.random.Generator) -> tupl
     Args:
         samples: per level, in their order, the scores (N,) of its seeds.
         rng: draws permutations.
+        same: scores that differ by no more than this count as equal, so that a trend in the last digit is none.
 
     Returns:
         The statistic from -1 (every pair falls) to 1 (every pair rises), and the p-value; both NaN for fewer than two
@@ -108,10 +109,11 @@ def jonckheere_p(samples: Sequence[ArrayLike], rng: np.random.Generator) -> tupl
         return math.nan, math.nan
     level = np.repeat(np.arange(len(arrays)), [array.size for array in arrays])
     scores = np.concatenate(arrays)
-    rising = np.sign(level[None, :] - level[:, None])  # 1 where the second of a pair has the higher level
+    rising = np.sign(level[None, :] - level[:, None])  # 1 if the second of a pair has the higher level
     order = rng.permuted(np.tile(np.arange(len(scores)), (MOST, 1)), axis=1)
     order[0] = np.arange(len(scores))
-    higher = np.sign(scores[None, :] - scores[:, None])
+    apart = scores[None, :] - scores[:, None]
+    higher = np.where(np.abs(apart) > same, np.sign(apart), 0.0)
     pairs = np.count_nonzero(rising > 0)
     concordant = _concordance(higher, rising, order) / (2.0 * pairs)
     return float(concordant[0]), _share_as_extreme(np.abs(concordant))

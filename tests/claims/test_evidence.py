@@ -44,15 +44,22 @@ def test_unfinished_and_failed_cells_do_not_count(tmp_path: Path) -> None:
     make_results(tmp_path)
     make_cell(tmp_path, "gnn_ppo", 3, 99.0, status=FAILED)
     make_cell(tmp_path, "gnn_ppo", 4, 99.0, status=RUNNING)
-    assert load_evidence(tmp_path).final_returns("push", "gnn_ppo").tolist() == [2.0, 2.0, 2.0]
+    assert load_evidence(tmp_path).final_returns("push", "gnn_ppo").tolist() == [2.0, 2.1, 2.2]
 
 
 def test_reference_points_are_read_where_there_are_any(tmp_path: Path) -> None:
     make_results(tmp_path)
     assert load_evidence(tmp_path).references.empty
-    row = {"task": ["push"], "point": ["idle"], "return_mean": [-1.5], "success_rate": [0.0]}
+    row = {"task": ["push"], "task_version": [1], "point": ["idle"], "return_mean": [-1.5], "success_rate": [0.0]}
     pd.DataFrame(row).to_csv(tmp_path / "reference_points.csv", index=False)
     assert load_evidence(tmp_path).references.to_dict("list") == row
+
+
+def test_reference_points_of_another_version_of_the_task_are_left_out(tmp_path: Path) -> None:
+    make_results(tmp_path)
+    row = {"task": ["push"], "task_version": [2], "point": ["idle"], "return_mean": [-1.5], "success_rate": [0.0]}
+    pd.DataFrame(row).to_csv(tmp_path / "reference_points.csv", index=False)
+    assert load_evidence(tmp_path).references.empty
 
 
 def test_final_returns_are_one_mean_per_seed_over_its_instances() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,20 +13,14 @@ from codesign_bench.claims.finding import InsufficientData
 from codesign_bench.claims.statistics import (
     at_each,
     check_methods,
-    difference,
-    estimate,
-    mean,
+    effect_scale,
+    largest_of,
     run_command,
     seeds_at_each,
     seeds_of,
-    trend,
 )
+from codesign_bench.stats import Estimate
 from evidence import OTHER, OURS, TASK, curves, finals
-
-
-def resampled(*samples: list[float]) -> list[np.ndarray]:
-    """Return samples as one resample each, (1, N)."""
-    return [np.array([sample]) for sample in samples]
 
 
 def budgets(ours: int, other: int) -> Evidence:
@@ -34,33 +30,39 @@ def budgets(ours: int, other: int) -> Evidence:
     return Evidence(pd.concat(parts), pd.concat([finals(OURS, (1.0,) * 3), finals(OTHER, (1.0,) * 3)]))
 
 
-def test_means_and_differences_are_per_resample() -> None:
-    sample = np.array([[1.0, 3.0], [5.0, 7.0]])
-    assert mean(sample).tolist() == [2.0, 6.0]
-    assert difference(sample, np.array([[1.0, 1.0], [9.0, 9.0]])).tolist() == [1.0, -3.0]
+def test_returns_are_measured_by_the_largest_mean_of_a_method() -> None:
+    parts = [finals(OURS, (1.0, 2.0, 3.0)), finals(OTHER, (-4.0, -4.0, -4.0)), finals("cma_es", (99.0,))]
+    evidence = Evidence(evaluations=pd.concat([*parts, finals(OURS, (50.0,) * 3, task="scoop")]))
+    assert effect_scale(evidence, TASK) == 4.0
+    for nothing in (Evidence(), Evidence(evaluations=finals(OURS, (0.0,) * 3))):
+        with pytest.raises(InsufficientData, match="no method has a return on push"):
+            effect_scale(nothing, TASK)
 
 
-def test_an_estimate_is_the_statistic_of_the_samples_themselves_within_its_interval() -> None:
-    samples = [np.array([1.0, 2.0, 6.0]), np.array([0.0, 1.0, 2.0])]
-    value, low, high = estimate(samples, difference, np.random.default_rng(0))
-    assert value == pytest.approx(3.0 - 1.0)
-    assert low < value < high
-    assert low >= 1.0 - 2.0  # all resamples of the lowest less all of the highest
-    assert high <= 6.0 - 0.0
+def test_returns_are_measured_by_the_normalised_range_if_it_is_known() -> None:
+    points = pd.DataFrame({"task": TASK, "point": ["idle", "best_known"], "return_mean": [-1.0, 9.0]})
+    assert effect_scale(Evidence(references=points), TASK) == 10.0
+    turned = points.assign(return_mean=[9.0, -1.0])
+    with pytest.raises(InsufficientData, match="no method has a return"):
+        effect_scale(Evidence(references=turned), TASK)
 
 
-def test_a_trend_is_the_rank_correlation_of_levels_and_means() -> None:
-    levels = (0.1, 0.2, 0.9)
-    assert trend(levels)(*resampled([1.0, 3.0], [5.0], [9.0])).tolist() == [pytest.approx(1.0)]
-    assert trend(levels)(*resampled([9.0], [5.0], [1.0])).tolist() == [pytest.approx(-1.0)]
-    # Ranks 1, 3, 2 against 1, 2, 3: 1 - 6 (0 + 1 + 1) / (3 * 8).
-    assert trend(levels)(*resampled([1.0], [9.0], [5.0])).tolist() == [pytest.approx(0.5)]
-    assert trend(levels)(*resampled([2.0], [2.0], [2.0])).tolist() == [0.0]
+def test_several_are_below_a_threshold_if_each_of_them_is() -> None:
+    steps = [Estimate(-2.0, -3.0, -1.0, 0.01), Estimate(-1.0, -1.8, -0.2, 0.04)]
+    wider = [Estimate(-2.0, -3.5, -0.5, 0.01), Estimate(-1.0, -2.0, 0.1, 0.04)]
+    assert largest_of(steps, wider, 0.0) == Estimate(-1.0, -2.0, -0.2, 0.04)
 
 
-def test_a_trend_is_looked_for_in_every_resample() -> None:
-    samples = [np.array([[0.0], [9.0]]), np.array([[1.0], [1.0]]), np.array([[2.0], [0.0]])]
-    assert trend((1.0, 2.0, 3.0))(*samples) == pytest.approx([1.0, -1.0])
+def test_one_of_several_above_a_threshold_is_found_in_as_many_tries() -> None:
+    steps = [Estimate(-2.0, -3.0, -1.0, 0.001), Estimate(1.0, 0.2, 1.8, 0.02)]
+    wider = [Estimate(-2.0, -3.5, -0.5, 0.001), Estimate(1.0, 0.1, 2.0, 0.02)]
+    assert largest_of(steps, wider, 0.0) == Estimate(1.0, 0.1, 1.8, 0.04)
+
+
+def test_a_step_without_spread_leaves_the_largest_without_an_interval() -> None:
+    found = largest_of([Estimate(1.0), Estimate(0.5, 0.4, 0.6, 0.01)], [], 0.0)
+    assert found.value == 1.0
+    assert math.isnan(found.low)
 
 
 def test_levels_are_read_in_rising_order_and_those_without_data_left_out() -> None:

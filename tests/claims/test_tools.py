@@ -32,14 +32,34 @@ def designs(lengths: Sequence[Sequence[float]]) -> Evidence:
 
 
 def test_tools_that_goals_alone_tell_apart_have_share_one() -> None:
-    finding = found(VARY, designs([(0.0, 1.0), (0.0, 1.0), (0.0, 1.0)]))
-    assert (finding.verdict, finding.value, finding.n) == (SUPPORTED, 1.0, "3 seeds")
+    shares = tools.goal_shares(designs([(0.0, 1.0), (0.0, 1.0), (0.0, 1.0)]).evaluations, WIDTHS[TASK])
+    assert shares.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_the_share_is_tested_against_a_tenth() -> None:
+    # Each seed's two lengths lie 1, 1.1 and 1.2 from their mean, all around 2: variances 1, 1.21, 1.44, mean 3.65 / 3.
+    finding = found(VARY, designs([(1.0, 3.0), (0.9, 3.1), (0.8, 3.2)]))
+    shares = np.array([1.0, 1.21, 1.44]) / (3.65 / 3.0)
+    assert (finding.verdict, finding.value, finding.n) == (SUPPORTED, pytest.approx(1.0), "3 seeds")
+    half = 4.302653 * shares.std(ddof=1) / math.sqrt(3.0)
+    assert (finding.low, finding.high) == (pytest.approx(1.0 - half, rel=1e-6), 1.0)
+    # t = (1 - 0.1) / (sd / sqrt 3) with 2 degrees of freedom has the two-sided p 1 - t / sqrt(2 + t^2).
+    t = 0.9 / (shares.std(ddof=1) / math.sqrt(3.0))
+    assert finding.p == pytest.approx(1.0 - t / math.sqrt(2.0 + t**2))
+
+
+def test_tools_that_differ_by_a_hair_are_one_tool() -> None:
+    hair = 2.0 * 2.0 * 0.9 * tools.FLOOR / math.sqrt(2.0)  # of the length's range of 2; the angle varies as much
+    rows = designs([(0.0, hair), (0.0, hair), (1.0, 1.0)]).evaluations
+    assert tools.goal_shares(rows, WIDTHS[TASK]).tolist() == [0.0, 0.0, 0.0]
+    assert tools.goal_shares(rows.assign(seed=0), WIDTHS[TASK]).tolist() == [1.0]
 
 
 def test_one_tool_for_all_goals_has_share_zero_whatever_its_seeds_do() -> None:
-    assert found(VARY, designs([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)])).verdict == CONTRADICTED
-    finding = found(VARY, designs([(1.0, 1.0), (1.0, 1.0), (1.0, 1.0)]))
-    assert (finding.verdict, finding.value, finding.high) == (CONTRADICTED, 0.0, 0.0)
+    finding = found(VARY, designs([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)]))
+    assert (finding.verdict, finding.value) == (UNDECIDED, 0.0), "equal shares have no spread"
+    almost = found(VARY, designs([(0.0, 0.1), (1.0, 1.0), (2.0, 2.0)]))
+    assert almost.verdict == CONTRADICTED
 
 
 def test_seeds_that_disagree_are_undecided() -> None:

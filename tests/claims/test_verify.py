@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from codesign_bench.claims.claim import Claim, Rule
 from codesign_bench.claims.evidence import Evidence, load_evidence
 from codesign_bench.claims.finding import (
+    CEILING,
     CONTRADICTED,
     NOT_ASKED,
     SUPPORTED,
@@ -72,18 +75,70 @@ def test_claims_of_each_verdict_are_counted_and_told() -> None:
         claim("three", None),
     ]
     rows = judge(claims, Evidence(), "here")
-    assert summary(rows) == "3 claims: 1 supported, 0 contradicted, 2 undecided (1 of them for lack of data)"
+    assert summary(rows) == (
+        "3 claims: 1 supported, 0 contradicted, 2 undecided, 0 ceiling (1 undecided for lack of data)"
+    )
     assert [row.interval for row in rows] == ["1.00 [0.50, 1.50]", "2.00 [0.00, never]", "-"]
     assert missing(rows) == ["make here"]
     study = study_of(claims)
     page = as_markdown(rows, study, Path("here"))
-    assert "| sentence of one | *supported* | 1.00 [0.50, 1.50] | 3 seeds | kind | section | so be it |" in page
+    assert "| sentence of one | *supported* | 1.00 [0.50, 1.50] |  |  | 3 seeds | kind | section | so be it |" in page
     assert "nothing there; needs: `make here`" in page
-    assert "| kind | 1 | 0 | 2 |" in page
+    assert "| kind | 1 | 0 | 2 | 0 |" in page
     assert "## Contradicted\n\nNone.\n" in page
     one, two, three = as_json(rows, study, Path("here"))["claims"]
     assert (one["value"], one["low"], one["high"]) == (1.0, 0.5, 1.5)
     assert (two["high"], three["value"], three["needs"]) == ("inf", None, ["make here"])
+
+
+def test_p_values_are_adjusted_within_each_kind_of_rule() -> None:
+    findings = {"a": 0.01, "b": 0.03, "c": 0.04, "d": math.nan}
+    claims = [claim(name, Finding(SUPPORTED, 1.0, 0.5, 1.5, p=p)) for name, p in findings.items()]
+    other = claim("other", Finding(CONTRADICTED, -1.0, p=0.04))
+    claims.append(replace(other, rule=replace(other.rule, kind="another")))
+    rows = judge([*claims, claim("lacking", None)], Evidence(), "here")
+    # Of three: 0.01 times 3; 0.03 times 2; 0.04, but no less than that. A family of one stays as it is.
+    adjusted = [row.finding.p_adjusted for row in rows]
+    assert adjusted[:3] + adjusted[4:5] == pytest.approx([0.03, 0.06, 0.06, 0.04])
+    assert [row.finding.family_size for row in rows] == [3, 3, 3, 0, 1, 0]
+    verdicts = [row.finding.verdict for row in rows]
+    assert verdicts == [SUPPORTED, UNDECIDED, UNDECIDED, SUPPORTED, CONTRADICTED, UNDECIDED]
+    assert rows[1].finding.note == "p is 0.060 after adjustment for 3 claims"
+    assert rows[0].p_values == ("0.010", "0.030 (3)")
+    assert rows[3].p_values == ("", "")
+    entry = as_json(rows, study_of(claims), Path("here"))["claims"][0]
+    assert (entry["p"], entry["p_adjusted"], entry["family_size"]) == (0.01, pytest.approx(0.03), 3)
+    assert "| 0.010 | 0.030 (3) |" in as_markdown(rows, study_of(claims), Path("here"))
+
+
+def test_checks_of_the_scenes_stand_apart() -> None:
+    claims = [
+        claim("found", Finding(CEILING, 0.1, 0.0, 0.2)),
+        replace(claim("intended", Finding(SUPPORTED, 1.0, 0.5, 1.5)), check_of_scene=True),
+    ]
+    rows, study = judge(claims, Evidence(), "here"), study_of(claims)
+    assert summary(rows) == (
+        "1 claims: 0 supported, 0 contradicted, 0 undecided, 1 ceiling; "
+        "1 checks of the scenes: 1 supported, 0 contradicted, 0 undecided, 0 ceiling (0 undecided for lack of data)"
+    )
+    content = as_json(rows, study, Path("here"))
+    assert [entry["name"] for entry in content["claims"]] == ["found"]
+    assert [entry["name"] for entry in content["checks_of_scenes"]] == ["intended"]
+    page = as_markdown(rows, study, Path("here"))
+    discoveries, checks = page.split("## Checks of the scenes")
+    assert "| kind | 0 | 0 | 0 | 1 |" in discoveries
+    assert "| kind (check of the scene) | 1 | 0 | 0 | 0 |" in discoveries
+    assert "sentence of found" in discoveries.split("## Every claim")[1]
+    assert "sentence of intended" not in discoveries.split("## Every claim")[1]
+    assert "sentence of intended" in checks
+
+
+def test_what_the_scenes_were_chosen_for_is_a_check_of_them() -> None:
+    checks = {entry.name for entry in CLAIMS if entry.check_of_scene}
+    assert {name for name in checks if name.endswith("shared_arch")} == set()
+    assert {entry.name for entry in CLAIMS if entry.name.startswith("no_single_tool.")} <= checks
+    for baseline in ("cma_rl", "hwasp_minimal", "cma_es"):
+        assert {entry.name for entry in CLAIMS if entry.name.endswith(f".{baseline}")} <= checks
 
 
 def test_what_is_contradicted_is_listed_with_its_number() -> None:
@@ -98,14 +153,14 @@ def test_a_claim_about_a_task_without_results_is_not_asked() -> None:
     rows = judge([asked, elsewhere], Evidence(), "here")
     assert [row.finding.verdict for row in rows] == [SUPPORTED, NOT_ASKED]
     assert summary(rows) == (
-        "1 claims: 1 supported, 0 contradicted, 0 undecided (0 of them for lack of data); "
+        "1 claims: 1 supported, 0 contradicted, 0 undecided, 0 ceiling (0 undecided for lack of data); "
         "1 more not asked, without results of all of weave"
     )
     assert missing(rows) == []
     assert "sentence of elsewhere" not in as_markdown(rows, study_of([asked, elsewhere]), Path("here"))
 
 
-def test_a_new_claim_moves_no_other_interval() -> None:
+def test_a_new_claim_moves_no_other_draw() -> None:
     def drawn(evidence: Evidence, rng: np.random.Generator) -> Finding:
         return Finding(UNDECIDED, float(rng.random()))
 

@@ -25,20 +25,20 @@ def test_verify_prints_and_writes_a_row_for_each_claim(tmp_path: Path, capsys: p
     printed = capsys.readouterr().out.splitlines()
     rows = {line.split()[1]: line for line in printed if line.split()[0] in VERDICTS}
     assert set(rows) == {claim.name for claim in CLAIMS if set(claim.tasks) <= {"push"}}
-    assert (
-        " ".join(rows["final_return.push.cma_rl"].split()[:5]) == "supported final_return.push.cma_rl 1.00 [1.00, 1.00]"
-    )
-    assert rows["steps.push.cma_rl"].split()[2] == "0.50"
-    assert rows["tools_vary.push"].startswith("contradicted")
+    # Returns of 2, 2.1 and 2.2 against 1: 1.1 -+ 4.303 * 0.1 / sqrt 3, t = 1.1 sqrt 3 / 0.1 and p = 0.003.
+    told = "supported final_return.push.cma_rl 1.10 [0.85, 1.35] 0.003 0.003"
+    assert " ".join(rows["final_return.push.cma_rl"].split()[:7]) == told, "a family of one"
+    assert rows["steps.push.cma_rl"].split()[0] == "supported"
+    assert rows["tools_vary.push"].startswith("undecided")
     assert rows["final_return.push.cma_es"].startswith("undecided")
     assert printed[-3].startswith("commits: not recorded (all ")
     assert printed[-2:] == [str(out / "claims.json"), str(out / "claims.md")]
 
     content = json.loads((out / "claims.json").read_text())
-    written = {row["name"]: row for row in content["claims"]}
+    written = {row["name"]: row for row in (*content["claims"], *content["checks_of_scenes"])}
     assert set(written) == {claim.name for claim in CLAIMS}
     assert {name for name, row in written.items() if row["verdict"] != NOT_ASKED} == set(rows)
-    assert written["final_return.push.cma_rl"]["value"] == pytest.approx(1.0)
+    assert written["final_return.push.cma_rl"]["value"] == pytest.approx(1.1)
     assert written["final_return.push.cma_rl"]["verdict"] == "supported"
     assert written["final_return.push.cma_es"]["value"] is None
     page = (out / "claims.md").read_text()

@@ -40,7 +40,7 @@ def interval(values: object, function: object) -> list[float]:
 def main(path: Path) -> None:
     """Write scores and numbers to `path`."""
     first, second = scores()
-    profiles, bands = library.create_performance_profile({"x": first}, np.array(THRESHOLDS), reps=RESAMPLES)
+    profiles, _ = library.create_performance_profile({"x": first}, np.array(THRESHOLDS), reps=RESAMPLES)
     content = {
         "made_with": {name: version(name) for name in ("rliable", "arch", "numpy", "scipy", "pandas")},
         "resamples": RESAMPLES,
@@ -50,12 +50,8 @@ def main(path: Path) -> None:
         "interquartile_mean": float(metrics.aggregate_iqm(first)),
         "interquartile_mean_interval": interval(first, lambda x: np.array([metrics.aggregate_iqm(x)])),
         "probability_of_improvement": float(metrics.probability_of_improvement(first, second)),
-        "probability_of_improvement_interval": interval(
-            (first, second), lambda x, y: np.array([metrics.probability_of_improvement(x, y)])
-        ),
         "thresholds": THRESHOLDS,
         "performance_profile": profiles["x"].tolist(),
-        "performance_profile_interval": bands["x"].tolist(),
     }
     path.write_text(json.dumps(content, indent=1) + "\n")
 

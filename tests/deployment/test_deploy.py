@@ -28,6 +28,7 @@ def test_trials_are_written_with_their_incidents_and_a_picture_of_each(tmp_path:
     table = pd.read_csv(folder / "trials.csv")
     assert table[["kind", "tool", "trial", "row", "column"]].to_numpy().tolist() == [["own", 4, 1, -1, -1]]
     assert table["instance_cube_start_x"].tolist() == [-0.211]
+    assert table[["policy_seed", "solved_in_training"]].to_numpy().tolist() == [[0, 1]]
     assert table["tracking_error_mean_mm"].item() > 0.0
     assert {"unreachable_steps", "joint_limit_steps", "self_collision_steps"} <= set(table.columns)
     summary = json.loads((folder / "trials.json").read_text())

@@ -10,7 +10,6 @@ import pytest
 from codesign_bench.cell.variant import Variant
 from codesign_bench.report.cells import read_cells
 from codesign_bench.report.final_values import STRIP_MARGIN, STRIP_WIDTH, estimate, strip, task_results, verdict
-from codesign_bench.seeding import generator
 from codesign_bench.storage.frames import load_results
 from codesign_bench.storage.records import FAILED
 from reports import make_cell
@@ -45,46 +44,56 @@ def test_methods_with_different_budgets_are_ranked_with_a_caution(tmp_path: Path
 
 
 def test_an_estimate_has_an_interval_from_three_seeds_on() -> None:
-    assert estimate([1.0, 3.0], generator(0, "two")).text == "2.00"
-    assert not estimate([1.0, 3.0], generator(0, "two")).has_interval
-    assert estimate([-2.0, -2.0, -2.0], generator(0, "three")).text == "−2.00 [−2.00, −2.00]"  # noqa: RUF001
+    assert estimate([1.0, 3.0]).text == "2.00"
+    assert not estimate([1.0, 3.0]).has_interval
+    assert not estimate([2.0, 2.0, 2.0]).has_interval, "equal seeds have no spread to estimate"
+    # Mean -2 and standard deviation 1: 4.303 / sqrt 3 on either side.
+    assert estimate([-3.0, -2.0, -1.0]).text == "−2.00 [−4.48, 0.48]"  # noqa: RUF001
 
 
 def test_marks_stand_where_the_values_are() -> None:
-    drawn = strip(estimate([0.0, 0.5, 1.0], generator(0, "three")), (0.0, 1.0))
+    drawn = strip(estimate([0.0, 0.5, 1.0]), (0.0, 1.0))
     assert drawn.dots == [STRIP_MARGIN, STRIP_WIDTH / 2.0, STRIP_WIDTH - STRIP_MARGIN]
     assert drawn.mean == STRIP_WIDTH / 2.0
-    assert STRIP_MARGIN <= drawn.low < drawn.mean < drawn.high <= STRIP_WIDTH - STRIP_MARGIN
+    # The interval is wider than the axis and ends with it.
+    assert (drawn.low, drawn.high) == (STRIP_MARGIN, STRIP_WIDTH - STRIP_MARGIN)
+    narrow = strip(estimate([0.4, 0.5, 0.6]), (0.0, 1.0))
+    assert STRIP_MARGIN < narrow.low < narrow.mean < narrow.high < STRIP_WIDTH - STRIP_MARGIN
 
 
 def test_a_strip_without_width_puts_its_dots_in_the_middle() -> None:
-    assert strip(estimate([2.0], generator(0, "one")), (2.0, 2.0)).dots == [STRIP_WIDTH / 2.0]
+    assert strip(estimate([2.0]), (2.0, 2.0)).dots == [STRIP_WIDTH / 2.0]
 
 
 @pytest.mark.parametrize(
     ("values", "expected"),
     [
         (
-            {"A": [1.0, 1.0, 1.0], "B": [5.0, 5.0, 5.0], "C": [0.0, 0.0, 0.0]},
-            "Highest final return: B, 5.00 [5.00, 5.00]; next: A, 1.00 [1.00, 1.00]. "
-            "Difference: 4.00 [4.00, 4.00]; the first is higher in 100% of pairs of seeds. The first is ahead.",
+            {"A": [0.0, 1.0, 2.0], "B": [4.0, 5.0, 6.0], "C": [0.0, 0.0, 0.0]},
+            "Highest final return: B, 5.00 [2.52, 7.48]; next: A, 1.00 [\N{MINUS SIGN}1.48, 3.48]. "
+            "Difference: 4.00 [1.73, 6.27]; the first is higher in 100% of pairs of seeds. The first is ahead.",
         ),
         (
-            {"A": [0.0, 6.0, 9.0], "B": [4.0, 4.0, 4.0]},
-            "Highest final return: A, 5.00 [0.00, 9.00]; next: B, 4.00 [4.00, 4.00]. "
-            "Difference: 1.00 [\N{MINUS SIGN}4.00, 5.00]; the first is higher in 67% of pairs of seeds. "
+            {"A": [1.0, 1.0, 1.0], "B": [5.0, 5.0, 5.0]},
+            "Highest final return: B, 5.00; next: A, 1.00. "
+            "Seeds do not differ, so there is no interval: their spread is unknown.",
+        ),
+        (
+            {"A": [4.0, 5.0, 6.0], "B": [4.0, 4.0, 4.0]},
+            "Highest final return: A, 5.00 [2.52, 7.48]; next: B, 4.00. "
+            "Difference: 1.00 [\N{MINUS SIGN}1.48, 3.48]; the first is higher in 83% of pairs of seeds. "
             "The interval contains 0: it may be chance.",
         ),
         (
             {"A": [5.0, 5.0], "B": [1.0, 1.0, 1.0]},
-            "Highest final return: A, 5.00; next: B, 1.00 [1.00, 1.00]. "
+            "Highest final return: A, 5.00; next: B, 1.00. "
             "With fewer than 3 seeds there is no interval, and no ranking.",
         ),
         ({"A": [5.0, 6.0, 7.0]}, "Only one method: nothing to compare it with."),
     ],
 )
 def test_the_verdict_says_how_sure_the_order_is(values: dict[str, list[float]], expected: str) -> None:
-    assert verdict([(label, estimate(numbers, generator(0, label))) for label, numbers in values.items()]) == expected
+    assert verdict([(label, estimate(numbers)) for label, numbers in values.items()]) == expected
 
 
 def test_no_curves_give_no_final_values(tmp_path: Path) -> None:

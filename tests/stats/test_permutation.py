@@ -67,6 +67,13 @@ def test_a_trend_by_hand(rng: np.random.Generator) -> None:
     assert jonckheere_p([[1.0], [1.0, 2.0]], rng)[0] == pytest.approx(0.5)
 
 
+def test_scores_within_the_tolerance_are_equal(rng: np.random.Generator) -> None:
+    assert jonckheere_p([[0.1], [0.2], [0.3]], rng)[0] == 1.0
+    assert jonckheere_p([[0.1], [0.2], [0.3]], rng, same=0.5) == (0.0, 1.0)
+    # Of three pairs, 0.1 and 0.9 alone are far enough apart, as are 0.2 and 0.9.
+    assert jonckheere_p([[0.1], [0.2], [0.9]], rng, same=0.5)[0] == pytest.approx(2 / 3)
+
+
 def test_a_trend_needs_two_levels_with_scores(rng: np.random.Generator) -> None:
     assert all(math.isnan(value) for value in jonckheere_p([[1.0]], rng))
     assert all(math.isnan(value) for value in jonckheere_p([[1.0], []], rng))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from scipy.stats import binom
 
-from codesign_bench.stats.proportions import proportion_interval
+from codesign_bench.stats.proportions import proportion_interval, proportion_test
 
 pytestmark = pytest.mark.numeric
 
@@ -21,6 +21,21 @@ def test_no_success_or_nothing_but_successes_by_hand(trials: int) -> None:
 def test_three_outcomes_of_one_kind_decide_nothing_about_a_half() -> None:
     assert proportion_interval(0, 3)[1] > 0.5
     assert proportion_interval(3, 3)[0] < 0.5
+
+
+def test_a_share_against_a_half_by_hand() -> None:
+    # Six of six heads, and their opposite: 2 / 2^6.
+    found = proportion_test(6, 6)
+    assert (found.value, found.low, found.p) == (1.0, pytest.approx(0.025 ** (1.0 / 6.0)), pytest.approx(2 / 64))
+    assert proportion_test(0, 3).p == pytest.approx(2 / 8)
+    assert proportion_test(2, 4).p == 1.0
+
+
+@pytest.mark.parametrize("null", [0.25, 0.5])
+def test_the_interval_leaves_out_what_the_test_rejects(null: float) -> None:
+    for successes in range(13):
+        found = proportion_test(successes, 12, null)
+        assert (found.p < 0.05) == (not found.low <= null <= found.high)
 
 
 def test_wilsons_interval_by_hand() -> None:

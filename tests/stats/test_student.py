@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from codesign_bench.stats.student import equivalent, mean_t_interval, paired_t, welch
+from codesign_bench.stats.student import equivalent, mean_across, mean_t_interval, one_sample_t, welch, welch_across
 
 pytestmark = pytest.mark.numeric
 
@@ -19,6 +19,11 @@ def test_the_interval_of_a_mean_by_hand() -> None:
     # Mean 2, standard deviation 1, so a standard error of 1 / sqrt 3.
     half = T_2_95 / math.sqrt(3.0)
     assert mean_t_interval([1.0, 2.0, 3.0]) == pytest.approx((2.0 - half, 2.0 + half), rel=1e-6)
+
+
+def test_an_interval_of_rates_stays_between_zero_and_one() -> None:
+    assert mean_t_interval([0.1, 0.5, 0.9], within=(0.0, 1.0)) == (0.0, 1.0)
+    assert mean_t_interval([0.4, 0.5, 0.6], within=(0.0, 1.0)) == mean_t_interval([0.4, 0.5, 0.6])
 
 
 def test_seeds_that_are_too_few_or_all_equal_give_no_interval() -> None:
@@ -50,11 +55,46 @@ def test_without_any_spread_there_is_a_difference_but_no_interval() -> None:
     assert math.isnan(welch([1.0, 2.0], [0.0, 1.0, 2.0]).low)
 
 
-def test_paired_differences_by_hand() -> None:
-    found = paired_t([1.0, 2.0, 3.0])
+def test_a_mean_against_a_number_by_hand() -> None:
+    found = one_sample_t([1.0, 2.0, 3.0])
     assert (found.value, found.low) == pytest.approx((2.0, 2.0 - T_2_95 / math.sqrt(3.0)), rel=1e-6)
     # t = 2 sqrt 3 = 3.464 with 2 degrees of freedom.
     assert found.p == pytest.approx(0.0742, abs=1e-4)
+    shifted = one_sample_t([11.0, 12.0, 13.0], 10.0)
+    assert (shifted.value, shifted.low - 10.0, shifted.p) == pytest.approx((12.0, found.low, found.p))
+    assert one_sample_t([1.0, 1.0, 1.0]).value == 1.0
+    assert math.isnan(one_sample_t([1.0, 1.0, 1.0]).p)
+
+
+def test_one_task_is_compared_as_by_welch() -> None:
+    first, second = [1.0, 2.0, 4.0], [0.0, 0.5, 0.7, 3.0]
+    one, across = welch(first, second), welch_across([(first, second)])
+    assert (across.value, across.low, across.high, across.p) == pytest.approx((one.value, one.low, one.high, one.p))
+
+
+def test_two_tasks_halve_the_variance_and_add_their_degrees_of_freedom() -> None:
+    # Four samples of variance 1 and three seeds: variance 4 / 3 / 2^2, degrees of freedom 4 * 2 = 8.
+    found = welch_across([([1.0, 2.0, 3.0], [0.0, 1.0, 2.0]), ([4.0, 5.0, 6.0], [1.0, 2.0, 3.0])])
+    half = 2.306004 * math.sqrt(1.0 / 3.0)
+    assert (found.value, found.low, found.high) == pytest.approx((2.0, 2.0 - half, 2.0 + half), rel=1e-6)
+    # t = 2 sqrt 3 = 3.464 with 8 degrees of freedom.
+    assert found.p == pytest.approx(0.0085, abs=1e-4)
+
+
+def test_a_mean_across_tasks_is_a_difference_from_zero() -> None:
+    found = mean_across([[1.0, 2.0, 3.0], [4.0, 6.0, 8.0, 10.0]])
+    zeros = [0.0] * 9999
+    same = welch_across([([1.0, 2.0, 3.0], zeros), ([4.0, 6.0, 8.0, 10.0], zeros)])
+    assert (found.value, found.low, found.high) == pytest.approx((4.5, same.low, same.high))
+    assert math.isnan(mean_across([]).value)
+    assert math.isnan(mean_across([[1.0, 2.0]]).low)
+
+
+def test_tasks_without_seeds_or_spread_give_no_interval() -> None:
+    assert math.isnan(welch_across([]).value)
+    assert math.isnan(welch_across([([1.0], [])]).value)
+    assert math.isnan(welch_across([([1.0] * 3, [0.0] * 3)]).low)
+    assert math.isnan(welch_across([([1.0, 2.0, 3.0], [0.0, 1.0])]).low)
 
 
 def test_means_are_equivalent_if_the_ninety_percent_interval_is_within_the_margin() -> None:

@@ -35,11 +35,11 @@ def deploy(results: Path, profile: str, log: Log) -> None:
     from codesign_bench.deployment.conditions import TRIAL
     from codesign_bench.deployment.deploy import Order
     from codesign_bench.deployment.deploy import deploy as play_trials
-    from codesign_bench.deployment.tables import FOLDER, PROTOCOL_FILE
+    from codesign_bench.deployment.tables import FOLDER, protocol_file
     from codesign_bench.storage.policies import policy_and_task
 
     for task_name in ON_AN_ARM:
-        if not (results / FOLDER / task_name / PROTOCOL_FILE).exists():
+        if not (results / FOLDER / task_name / protocol_file(policy_seed=0)).exists():
             folder = Cell(task_name, OURS, seed=0, profile=profile).folder(results)
             policy, task = policy_and_task(folder, task_name)
             play_trials(task, policy, Order(TRIAL, protocol=True, gifs=False), results, log, str(folder))

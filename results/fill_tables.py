@@ -77,8 +77,8 @@ def _script(results: Path) -> str:
     counted = f"{len(ahead)} of {len(tasks)} tasks ({ours})"
     earning = sum(scripts["return_mean"][task] > both["return_mean"][task] for task in tasks)
     return (
-        f"A script written by hand solves more instances than `{PAPERS_METHOD}`, mean over seeds, on {counted}{others}. "
-        f"Its return is higher on {earning} of {len(tasks)}.\n"
+        f"A script written by hand solves more instances than `{PAPERS_METHOD}`, mean over seeds, on {counted}{others}."
+        f" Its return is higher on {earning} of {len(tasks)}.\n"
     )
 
 

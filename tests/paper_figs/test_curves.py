@@ -17,13 +17,16 @@ from codesign_bench.paper_figs._curves import (
     REFERENCE_STYLES,
     draw_curve,
     draw_curves,
+    draw_seeds,
     evaluated_rows,
     method_labels,
     reference_texts,
+    seed_curves,
 )
 from codesign_bench.storage.reference_points import POINTS
 
 STEPS = (0, 1000, 2000)
+NO_SEEDS = pd.DataFrame(columns=["task", "method", "quantity", "seed", "env_steps", "value"])
 
 
 def curve(
@@ -94,7 +97,7 @@ def test_a_start_that_some_seeds_lack_is_cut_off_alike() -> None:
 
 def test_every_task_has_a_panel_of_returns_above_one_of_success_rates() -> None:
     tasks = ("scoop", "push", "catch_balls", "lift_cup")
-    figure = draw_curves(pd.concat([both(task, "gnn_ppo") for task in tasks]), {}, "bands: none")
+    figure = draw_curves(pd.concat([both(task, "gnn_ppo") for task in tasks]), NO_SEEDS, {}, "bands: none")
     shown = [axes for axes in figure.axes if axes.get_visible()]
     assert [axes.get_title() for axes in shown if axes.get_title()] == ["push", "catch balls", "scoop", "lift cup"]
     above, below = (
@@ -148,14 +151,24 @@ def test_every_reference_point_has_a_line_of_its_own() -> None:
 
 def test_the_legend_counts_seeds_in_the_order_of_methods() -> None:
     table = pd.concat([both("push", "mine"), both("push", "cma_es", seeds=1), both("push", "gnn_ppo")])
-    figure = draw_curves(table, {"mine": "My own"}, "bands: standard error")
+    figure = draw_curves(table, NO_SEEDS, {"mine": "My own"}, "bands: standard error")
     assert legend(figure) == ["gnn_ppo (n=3)", "cma_es (n=1)", "My own (n=3)"]
     assert figure.legends[0].get_title().get_text() == "bands: standard error"
 
 
 def test_the_legend_gives_the_range_of_seeds_over_tasks() -> None:
     table = pd.concat([both("push", "gnn_ppo"), both("scoop", "gnn_ppo", seeds=1)])
-    assert legend(draw_curves(table, {}, "")) == ["gnn_ppo (n=1-3)"]
+    assert legend(draw_curves(table, NO_SEEDS, {}, "")) == ["gnn_ppo (n=1-3)"]
+
+
+def test_every_seed_is_a_thin_line_of_its_own() -> None:
+    points = {"env_steps": [0, 10, 0, 10], "return_mean": [0.0, 1.0, 0.0, 3.0], "success_rate": [0.0, 0.1, 0.0, 0.3]}
+    rows = pd.DataFrame({**points, "seed": [0, 0, 4, 4]}).assign(task="push", method="gnn_ppo", variant="default")
+    seeds = seed_curves(rows)
+    assert set(seeds["quantity"]) == set(QUANTITIES)
+    axes: Axes = Figure().subplots()
+    draw_seeds(axes, seeds[seeds["quantity"] == "return_mean"], "#0072B2", gid="ours")
+    assert lines(axes) == {"ours seed 0": [[0.0, 0.0], [10.0, 1.0]], "ours seed 4": [[0.0, 0.0], [10.0, 3.0]]}
 
 
 def test_labels_are_those_of_the_frame_where_it_has_any() -> None:

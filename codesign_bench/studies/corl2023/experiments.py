@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from codesign_bench.cell.cell import Cell
-from codesign_bench.cell.variant import Variant
+from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.console import Log
 from codesign_bench.studies.corl2023.members import METHODS, OURS, SEEDS, STARTS, TASKS
 from codesign_bench.studies.corl2023.protocol import PROTOCOL
@@ -27,22 +27,30 @@ def sweep_the_baseline(results: Path, profile: str, log: Log) -> None:
 
 
 def deploy(results: Path, profile: str, log: Log) -> None:
-    """Play the paper's trials of our method's first seed on the arm unless `results` already has them.
+    """Play the paper's trials on the arm with the first seed of our method, and with every other finished seed.
+
+    Trials in `results` are not played again.
 
     Raises:
-        UserError: a seed's cell is not done.
+        UserError: the cell of the first seed is not done.
     """
     from codesign_bench.deployment.conditions import TRIAL
     from codesign_bench.deployment.deploy import Order
     from codesign_bench.deployment.deploy import deploy as play_trials
     from codesign_bench.deployment.tables import FOLDER, protocol_file
+    from codesign_bench.storage.cells import find_cells
     from codesign_bench.storage.policies import policy_and_task
 
     for task_name in ON_AN_ARM:
-        if not (results / FOLDER / task_name / protocol_file(policy_seed=0)).exists():
-            folder = Cell(task_name, OURS, seed=0, profile=profile).folder(results)
-            policy, task = policy_and_task(folder, task_name)
-            play_trials(task, policy, Order(TRIAL, protocol=True, gifs=False), results, log, str(folder))
+        done = (cell.record for cell in find_cells(results) if cell.is_done and cell.has_policy)
+        wanted = (task_name, OURS, DEFAULT)
+        others = {record.seed for record in done if (record.task, record.method, record.variant) == wanted}
+        for seed in sorted({0} | others):
+            if not (results / FOLDER / task_name / protocol_file(seed)).exists():
+                folder = Cell(task_name, OURS, seed=seed, profile=profile).folder(results)
+                policy, task = policy_and_task(folder, task_name)
+                order = Order(TRIAL, protocol=True, gifs=False, policy_seed=seed)
+                play_trials(task, policy, order, results, log, str(folder))
 
 
 EXPERIMENTS: Mapping[str, Experiment] = {

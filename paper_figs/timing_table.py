@@ -87,7 +87,7 @@ def _row(frame: pd.DataFrame, task: str, method: str) -> dict[str, object]:
         "profile": ", ".join(sorted(set(cells["profile"]))),
         "cells": len(cells),
         "steps_per_second": speed,
-        "training_minutes": PROTOCOL.total_steps / speed / 60.0,
+        "training_minutes": PROTOCOL.total_steps / speed / 60.0 if speed > 0.0 else float("inf"),
         "inference_ms": 1e3 * float(cells["inference_s"].median()),
         "cores": int(cells["cores"].max()),
         "cpu": " / ".join(sorted(set(cells["cpu"]))),

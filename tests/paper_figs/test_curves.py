@@ -116,7 +116,7 @@ def levels(task: str, **returns: float) -> pd.DataFrame:
 def test_reference_points_are_thin_lines_in_the_panels_of_their_task_and_named_once() -> None:
     table = pd.concat([both("push", "gnn_ppo"), both("scoop", "gnn_ppo")])
     points = pd.concat([levels("push", idle=-1.0, best_known=2.0), levels("scoop", idle=-3.0)])
-    figure = draw_curves(table, {}, "", points)
+    figure = draw_curves(table, NO_SEEDS, {}, "", points)
     drawn = {
         (axes.get_ylabel(), line.get_gid(), line.get_ydata()[0])
         for axes in figure.axes
@@ -138,9 +138,9 @@ def test_reference_points_are_thin_lines_in_the_panels_of_their_task_and_named_o
 
 
 def test_without_reference_points_a_figure_says_nothing_of_them() -> None:
-    assert legend(draw_curves(both("push", "gnn_ppo"), {}, "", levels("push").reindex(columns=["task", "point"]))) == [
-        "gnn_ppo (n=3)"
-    ]
+    assert legend(
+        draw_curves(both("push", "gnn_ppo"), NO_SEEDS, {}, "", levels("push").reindex(columns=["task", "point"]))
+    ) == ["gnn_ppo (n=3)"]
     assert reference_texts(both("push", "gnn_ppo")) == {}
 
 

@@ -9,7 +9,7 @@ from reports import Reader
 
 def test_figures_lie_in_the_page_with_their_numbers(page: str) -> None:
     pictures = [address for address in Reader(page).addresses if address.startswith("data:image/png;base64,")]
-    assert len(pictures) == 3  # learning curves, as means and as interquartile means, and final results
+    assert len(pictures) == 4  # learning curves, as means and as interquartile means, final results, and times
     assert base64.b64decode(pictures[0].partition(",")[2]).startswith(b"\x89PNG")
     numbers, *_ = (address for address in Reader(page).addresses if address.startswith("data:text/csv;base64,"))
     table = base64.b64decode(numbers.partition(",")[2]).decode()

@@ -85,7 +85,7 @@ def test_what_is_lacking_is_told() -> None:
         found(CLOSE, Evidence())
     with pytest.raises(InsufficientData, match=r"126 instances in the region 0\.1 of push; 128 are needed"):
         found(CLOSE, regions({0.1: (9.0, 8.0, 7.0)}, instances=126))
-    with pytest.raises(InsufficientData, match="nothing was learned"):
+    with pytest.raises(InsufficientData, match="no learned behaviour"):
         found(CLOSE, regions({0.1: (1.0, 1.0, 1.0)}, seen=-0.1))
 
 

@@ -67,21 +67,22 @@ def seed_curves(rows: pd.DataFrame) -> pd.DataFrame:
 
 def draw_curves(
     table: pd.DataFrame,
-    seeds: pd.DataFrame,
     labels: dict[str, str],
     note: str,
     references: pd.DataFrame | None = None,
+    seeds: pd.DataFrame | None = None,
 ) -> Figure:
     """Return for each task a panel of returns above one of success rates, and one legend with seed counts.
 
     Args:
         table: columns task, method, quantity (a key of `QUANTITIES`), env_steps, centre, low, high (NaN where there is
             no interval), seeds (the number that reached this step).
-        seeds: rows of `seed_curves`, drawn as thin lines.
         labels: names of methods in the legend, if they differ from the method's.
         note: explanation of lines and bands.
         references: levels to draw as thin grey lines, rows of `reference_points_in`; None: none.
+        seeds: rows of `seed_curves`, drawn as thin lines; None: none.
     """
+    drawn = pd.DataFrame(columns=["task", "quantity", "method", "seed"]) if seeds is None else seeds
     levels = pd.DataFrame(columns=["task", "point"]) if references is None else references
     styles = line_styles(table["method"])
     tasks = task_order(table["task"])
@@ -98,7 +99,7 @@ def draw_curves(
             top = len(QUANTITIES) * block
             for row, quantity in enumerate(QUANTITIES, start=top):
                 curves = table[(table["task"] == task) & (table["quantity"] == quantity)]
-                single = seeds[(seeds["task"] == task) & (seeds["quantity"] == quantity)]
+                single = drawn[(drawn["task"] == task) & (drawn["quantity"] == quantity)]
                 _draw_panel(axes[row, column], curves, single, quantity, styles)
                 draw_references(axes[row, column], levels[levels["task"] == task], quantity)
             axes[top, column].set_title(str(task).replace("_", " "))

@@ -62,10 +62,10 @@ def draw(frame: pd.DataFrame) -> Figure:
     rows = evaluated_rows(frame)
     return draw_curves(
         table.assign(centre=table["mean"], low=low, high=high),
-        seed_curves(rows),
         method_labels(frame),
         INTERVAL,
         reference_points_in(rows),
+        seed_curves(rows),
     )
 
 

@@ -63,6 +63,7 @@ OF_NO_MODULE = {
     "tests/sweep/test_resume.py": "of whole sweeps that are killed",
     "tests/tasks/_scripts/test_contract.py": "of every script",
     "tests/tasks/test_contract.py": "of every task",
+    "tests/tasks/test_frozen_scenes.py": "of every task: that its scene is the one of its version",
     "tests/tasks/test_soundness.py": "of every task: that its physics are sound",
     "tests/test_architecture.py": "of the code as a whole",
     "tests/test_packaging.py": "of the package as it installs",

@@ -98,7 +98,16 @@ def draw(frame: pd.DataFrame) -> Figure:
         axes.set_xlabel("share of the budget")
         axes.set_ylabel("success rate")
         axes.set_ylim(-0.03, 1.03)
-        figure.legend(handles=handles[::-1], loc="outside lower center", ncols=2, title=INTERVAL, title_fontsize=5.5)
+        figure.legend(
+            handles=handles[::-1],
+            loc="outside lower center",
+            ncols=2,
+            fontsize=5.5,
+            handlelength=1.5,
+            columnspacing=1.0,
+            title=INTERVAL,
+            title_fontsize=5.5,
+        )
         figure.draw_without_rendering()
     return figure
 

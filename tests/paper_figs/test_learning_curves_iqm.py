@@ -86,3 +86,15 @@ def test_the_kind_of_interval_is_written_on_the_figure() -> None:
 def test_results_without_a_default_cell_say_so() -> None:
     with pytest.raises(UserError, match="no evaluated cell"):
         figure.draw(curves([1.0]).assign(variant="alpha-0.30"))
+
+
+def test_the_legend_fits_in_the_figure() -> None:
+    methods = ("gnn_ppo", "shared_arch", "cma_rl", "hwasp_minimal", "cma_es")
+    frame = pd.concat(
+        [curves([0.1, 0.2, 0.3], method=name).assign(label="GNN-PPO, separate credit") for name in methods]
+    )
+    drawn = figure.draw(frame)
+    (legend,) = drawn.legends
+    box = legend.get_window_extent()
+    assert drawn.bbox.x0 <= box.x0
+    assert box.x1 <= drawn.bbox.x1

@@ -98,7 +98,7 @@ CUP_MASS: Annotated[float, Given("kg", OURS)] = 0.2
 """Of a cup."""
 WALL: Annotated[float, Given("m", OURS)] = 0.008
 """Thickness of walls and bottom."""
-RIM_WIDTH: Annotated[float, Given("m", OURS)] = 0.012
+RIM_WIDTH: Annotated[float, Given("m", OURS)] = 0.009
 """How far the rim stands out from the walls: the play of a prong between wall and the rim's edge."""
 RIM_THICKNESS: Annotated[float, Given("m", OURS)] = 0.008
 """Of the rim."""

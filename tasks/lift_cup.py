@@ -103,7 +103,7 @@ CUP_MASS: Annotated[float, Given("kg", OURS)] = 0.2
 """Mass of a cup."""
 WALL: Annotated[float, Given("m", OURS)] = 0.008
 """Thickness of walls and bottom."""
-RIM_WIDTH: Annotated[float, Given("m", OURS)] = 0.012
+RIM_WIDTH: Annotated[float, Given("m", OURS)] = 0.009
 """Width of the rim beyond the walls: the play of a prong between the wall and the rim's edge."""
 RIM_THICKNESS: Annotated[float, Given("m", OURS)] = 0.008
 """Thickness of the rim."""

@@ -26,7 +26,6 @@ from codesign_bench.paper_figs._curves import (
 from codesign_bench.storage.reference_points import POINTS
 
 STEPS = (0, 1000, 2000)
-NO_SEEDS = pd.DataFrame(columns=["task", "method", "quantity", "seed", "env_steps", "value"])
 
 
 def curve(
@@ -97,7 +96,7 @@ def test_a_start_that_some_seeds_lack_is_cut_off_alike() -> None:
 
 def test_every_task_has_a_panel_of_returns_above_one_of_success_rates() -> None:
     tasks = ("scoop", "push", "catch_balls", "lift_cup")
-    figure = draw_curves(pd.concat([both(task, "gnn_ppo") for task in tasks]), NO_SEEDS, {}, "bands: none")
+    figure = draw_curves(pd.concat([both(task, "gnn_ppo") for task in tasks]), {}, "bands: none")
     shown = [axes for axes in figure.axes if axes.get_visible()]
     assert [axes.get_title() for axes in shown if axes.get_title()] == ["push", "catch balls", "scoop", "lift cup"]
     above, below = (
@@ -116,7 +115,7 @@ def levels(task: str, **returns: float) -> pd.DataFrame:
 def test_reference_points_are_thin_lines_in_the_panels_of_their_task_and_named_once() -> None:
     table = pd.concat([both("push", "gnn_ppo"), both("scoop", "gnn_ppo")])
     points = pd.concat([levels("push", idle=-1.0, best_known=2.0), levels("scoop", idle=-3.0)])
-    figure = draw_curves(table, NO_SEEDS, {}, "", points)
+    figure = draw_curves(table, {}, "", points)
     drawn = {
         (axes.get_ylabel(), line.get_gid(), line.get_ydata()[0])
         for axes in figure.axes
@@ -138,9 +137,9 @@ def test_reference_points_are_thin_lines_in_the_panels_of_their_task_and_named_o
 
 
 def test_without_reference_points_a_figure_says_nothing_of_them() -> None:
-    assert legend(
-        draw_curves(both("push", "gnn_ppo"), NO_SEEDS, {}, "", levels("push").reindex(columns=["task", "point"]))
-    ) == ["gnn_ppo (n=3)"]
+    assert legend(draw_curves(both("push", "gnn_ppo"), {}, "", levels("push").reindex(columns=["task", "point"]))) == [
+        "gnn_ppo (n=3)"
+    ]
     assert reference_texts(both("push", "gnn_ppo")) == {}
 
 
@@ -151,14 +150,14 @@ def test_every_reference_point_has_a_line_of_its_own() -> None:
 
 def test_the_legend_counts_seeds_in_the_order_of_methods() -> None:
     table = pd.concat([both("push", "mine"), both("push", "cma_es", seeds=1), both("push", "gnn_ppo")])
-    figure = draw_curves(table, NO_SEEDS, {"mine": "My own"}, "bands: standard error")
+    figure = draw_curves(table, {"mine": "My own"}, "bands: standard error")
     assert legend(figure) == ["gnn_ppo (n=3)", "cma_es (n=1)", "My own (n=3)"]
     assert figure.legends[0].get_title().get_text() == "bands: standard error"
 
 
 def test_the_legend_gives_the_range_of_seeds_over_tasks() -> None:
     table = pd.concat([both("push", "gnn_ppo"), both("scoop", "gnn_ppo", seeds=1)])
-    assert legend(draw_curves(table, NO_SEEDS, {}, "")) == ["gnn_ppo (n=1-3)"]
+    assert legend(draw_curves(table, {}, "")) == ["gnn_ppo (n=1-3)"]
 
 
 def test_every_seed_is_a_thin_line_of_its_own() -> None:

@@ -38,11 +38,16 @@ def run_command(method: str, task: str, seeds: int, more: str = "") -> str:
     return f"codesign-bench run --method {method} --task {task}{more} --seeds {seeds}{{profile}} --out {{results}}"
 
 
-def effect_scale(evidence: Evidence, task: str) -> float:
+def effect_scale(evidence: Evidence, task: str, *sides: tuple[str, Variant]) -> float:
     """Return the difference of returns that counts as 1 on a task.
 
     It is the range of normalised scores, the best known return minus that of an idle policy with random tools, if the
     results have both reference points. Otherwise it is the largest absolute mean final return of a method.
+
+    Args:
+        evidence: what is known.
+        task: name of the task.
+        sides: what is compared, each (method, variant); counts beside the methods' default cells.
 
     Raises:
         InsufficientData: there are no reference points, and no method has enough finished seeds and any return.
@@ -51,9 +56,9 @@ def effect_scale(evidence: Evidence, task: str) -> float:
     if known is not None and known.one > known.zero:
         return known.one - known.zero
     means = []
-    for method in evidence.methods(task):
+    for method, variant in [*((name, DEFAULT) for name in evidence.methods(task)), *sides]:
         try:
-            means.append(abs(float(evidence.final_returns(task, method).mean())))
+            means.append(abs(float(evidence.final_returns(task, method, variant).mean())))
         except InsufficientData:
             continue
     scale = max(means, default=0.0)

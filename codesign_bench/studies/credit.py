@@ -7,9 +7,15 @@ one is never reported.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 from codesign_bench.cell.axes import Axis
 from codesign_bench.cell.variant import Value, Variant
 from codesign_bench.study import Experiment, Grid, Study
+
+if TYPE_CHECKING:
+    from codesign_bench.claims.claim import Claim
 
 METHODS = ("gnn_ppo", "shared_arch")
 TASKS = ("push", "catch_balls", "scoop", "fetch_cube", "lift_cup", "scoop_3d")
@@ -30,6 +36,47 @@ class DesignCredit(Axis):
         return (f"design_credit={value}",)
 
 
+def claims() -> Sequence[Claim]:
+    """Return the claims, which were written down before their results were seen.
+
+    The first decides the default of `laptop` and `quick`, the same for every method: separate credit if it is
+    contradicted, and the paper's joint credit otherwise.
+    """
+    from codesign_bench.claims.claim import Claim
+    from codesign_bench.claims.variants import Contrast, variant_ahead, variant_helps_more
+
+    joint, separate = (Variant.of(credit=name) for name in CREDITS)
+    needs = "codesign-bench reproduce --study credit --out {results}{profile}"
+    contrast = Contrast(TASKS, joint, separate, (needs,))
+    own, shared = METHODS
+    return [
+        Claim(
+            "joint.all_methods",
+            "across tasks and architectures, joint credit ends with a higher return than separate credit",
+            "ours",
+            variant_ahead(contrast, METHODS),
+            TASKS,
+        ),
+        *(
+            Claim(
+                f"joint.{method}",
+                f"across tasks, {method} ends with a higher return with joint credit than with separate credit",
+                "ours",
+                variant_ahead(contrast, (method,)),
+                TASKS,
+            )
+            for method in METHODS
+        ),
+        Claim(
+            f"joint.{own}.{shared}",
+            f"joint credit is worth more to {own} than to {shared}",
+            "ours",
+            variant_helps_more(contrast, own, shared),
+            TASKS,
+        ),
+    ]
+
+
 STUDY = Study(
     name="credit",
     title="What is a separate credit for the design worth?",
@@ -43,4 +90,5 @@ STUDY = Study(
         ),
     },
     axes=(DesignCredit(),),
+    claims=claims,
 )

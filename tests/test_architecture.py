@@ -28,7 +28,6 @@ MEMBERS = {"methods": "methods", "tasks": "tasks", "paper_figs": "paper_figs", "
 EVERY_METHOD = "tests/methods/test_contract.py and tests/methods/test_honesty.py ask every method"
 PRINTED = "numbers that the paper prints"
 TESTED_ELSEWHERE = {
-    "codesign_bench/claims/claim.py": "data alone; tests/claims/test_verify.py judges claims made of it",
     "codesign_bench/learning/ppo_method.py": f"an abstract class; {EVERY_METHOD}, most of which extend it",
     "codesign_bench/studies/corl2023/learners.py": f"{PRINTED}; tests/studies/corl2023/test_tables.py",
     "codesign_bench/studies/corl2023/members.py": "names alone; tests/study/test_study.py resolves every cell of them",

@@ -214,9 +214,9 @@ def _cutout(task: Task) -> Iterator[str]:
         WIDTH,
     )
     if type(task).fine_tuning_instances is not Task.fine_tuning_instances:
-        told = _doc(type(task).fine_tuning_instances).removeprefix("Return ")
-        yield f"`--finetune N` fine-tunes a policy on one of {re.sub(r', [(][^)]*[)]', '', told)}"
-        rows = (map(number, instance) for instance in task.fine_tuning_instances().tolist())
+        told = re.sub(r"^Return [(][^)]*[)]: ", "", _doc(type(task).fine_tuning_instances))
+        yield textwrap.fill(f"`--finetune N` fine-tunes a policy at one of {told}", WIDTH)
+        rows = (map(number, place[0]) for place in task.fine_tuning_instances().tolist())
         yield _table(("`--finetune`", *task.instance_space.names), ((str(n + 1), *row) for n, row in enumerate(rows)))
 
 

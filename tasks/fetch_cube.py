@@ -76,6 +76,10 @@ PAPER_FINE_TUNING: Annotated[tuple[tuple[float, float], ...], Given("m", UNSEEN,
     (0.415, 0.610),
 )
 """Starts outside the training region, in the paper's frame."""
+FINE_TUNING_RADIUS: Annotated[float, Given("m", OURS)] = 0.015
+"""Distance from such a start of the other instances at the same place: they are all outside the region."""
+AROUND_START: Annotated[int, Given("instances", OURS)] = 7
+"""Number of these others."""
 CUBE_SIZE: Annotated[float, Given("m", REAL_ROBOT)] = 0.05
 """Side of the cube."""
 CUBE_MASS: Annotated[float, Given("kg", OURS)] = 0.1
@@ -290,9 +294,15 @@ class FetchCube(Task):
         return result
 
     def fine_tuning_instances(self) -> Floats:
-        """Return the paper's four starts outside the training region, (4, I), in our frame."""
+        """Return (4, 8, I): the paper's four starts outside the training region, in our frame, each with seven others.
+
+        These lie on a circle around it that stays outside the region.
+        """
         x, y = np.array(PAPER_FINE_TUNING).T
-        return np.stack([x, PAPER_ORIGIN - y], axis=1)
+        places = np.stack([x, PAPER_ORIGIN - y], axis=1)
+        angles = 2.0 * np.pi * np.arange(AROUND_START) / AROUND_START
+        circle = FINE_TUNING_RADIUS * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        return places[:, None, :] + np.concatenate([np.zeros((1, 2)), circle])
 
     def material(self, designs: Floats) -> Floats:
         """Return the volume of the links as a fraction of the largest, for designs (b, D) in their units."""

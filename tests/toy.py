@@ -50,8 +50,8 @@ class ToyReach(Task):
         return np.asarray(instances[:, 0] < fraction)
 
     def fine_tuning_instances(self) -> Floats:
-        """Two goals, one of them out of the training region."""
-        return np.array([[1.2], [0.3]])
+        """Two places, one of them out of the training region, with two goals each."""
+        return np.array([[[1.2], [1.25]], [[0.3], [0.35]]])
 
     def material(self, designs: Floats) -> Floats:
         """The stick's length over the longest."""

@@ -91,44 +91,53 @@ class Alpha(Axis):
         return replace(problem, tradeoff=Tradeoff(float(value), run.tradeoff_scale))
 
 
-class _OneInstance(Axis):
-    """Trains only on one of the task's fine-tuning instances."""
+FINE_TUNING_INSTANCES = 8
+"""Instances at a fine-tuning place (ours; the paper and version 0.1.0 have one)."""
+
+
+class _OnePlace(Axis):
+    """Trains only at one of the task's fine-tuning places."""
 
     kind = int
     metavar = "N"
     exclusive = "instance"
 
     def check(self, value: Value, task: Task) -> None:
-        """Check that the task has an instance with this number."""
+        """Check that the task has a place with this number."""
         count = len(task.fine_tuning_instances())
         if not 1 <= int(value) <= count:
-            raise UserError(f"--{self.name} {value}: task '{task.name}' has fine-tuning instances 1 to {count}")
+            raise UserError(f"--{self.name} {value}: task '{task.name}' has fine-tuning places 1 to {count}")
+
+    def overrides(self, value: Value) -> tuple[str, ...]:
+        """Train and evaluate on several instances there."""
+        return (f"run.fine_tuning_instances={FINE_TUNING_INSTANCES}",)
 
     def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
-        """Train and evaluate on this instance."""
-        return replace(problem, instances=problem.task.fine_tuning_instances()[int(value) - 1 : int(value)])
+        """Train and evaluate on the instances of this place."""
+        place = problem.task.fine_tuning_instances()[int(value) - 1]
+        return replace(problem, instances=place[: run.fine_tuning_instances])
 
     def run_overrides(self, run: RunSettings) -> Mapping[str, tuple[Any, str]]:
-        """Return the smaller budget for one instance."""
+        """Return the smaller budget for one place."""
         return {"steps": (run.fine_tuning_steps, "fine_tuning_steps")}
 
 
-class Finetune(_OneInstance):
-    """Fine-tunes the finished policy of the same cell without this axis on one instance (paper, section 5.2)."""
+class Finetune(_OnePlace):
+    """Fine-tunes the finished policy of the same cell without this axis at one place (paper, section 5.2)."""
 
     name = "finetune"
-    help = "fine-tune the finished default cell on fine-tuning instance N"
+    help = "fine-tune the finished default cell at fine-tuning place N"
 
     def pretrained(self, variant: Variant) -> Variant | None:
         """Start from the cell without this axis."""
         return variant.without(self.name)
 
 
-class Scratch(_OneInstance):
-    """Trains from scratch on one instance, as a comparison for fine-tuning (paper, section 5.2)."""
+class Scratch(_OnePlace):
+    """Trains from scratch at one place, as a comparison for fine-tuning (paper, section 5.2)."""
 
     name = "scratch"
-    help = "train from scratch on fine-tuning instance N"
+    help = "train from scratch at fine-tuning place N"
 
 
 class _OfTuning(Axis):

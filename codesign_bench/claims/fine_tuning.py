@@ -1,4 +1,4 @@
-"""Rules about fine-tuning a trained policy on one instance.
+"""Rules about fine-tuning a trained policy at one place outside the training region.
 
 Shapes: `N` seeds.
 """
@@ -33,7 +33,7 @@ EXACT_INTERVAL = "the exact 95 % interval (Clopper and Pearson)"
 
 
 def fine_tuning_ahead(task: str, method: str, number: int, needs: tuple[str, ...]) -> Rule:
-    """Return the rule for "fine-tuning on instance `number` beats training from scratch"."""
+    """Return the rule for "fine-tuning at place `number` beats training from scratch"."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         del rng  # nothing is drawn
@@ -56,7 +56,7 @@ def fine_tuning_ahead(task: str, method: str, number: int, needs: tuple[str, ...
 
 
 def most_fail_before(task: str, method: str, number: int, needs: tuple[str, ...]) -> Rule:
-    """Return the rule for "before fine-tuning, the policy does not solve fine-tuning instance `number`"."""
+    """Return the rule for "before fine-tuning, the policy fails at fine-tuning place `number`"."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         del rng  # nothing is drawn
@@ -74,7 +74,7 @@ def most_fail_before(task: str, method: str, number: int, needs: tuple[str, ...]
 
 
 def most_succeed_after(task: str, method: str, number: int, needs: tuple[str, ...]) -> Rule:
-    """Return the rule for "after fine-tuning, the policy solves fine-tuning instance `number`"."""
+    """Return the rule for "after fine-tuning, the policy succeeds at fine-tuning place `number`"."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         del rng  # nothing is drawn

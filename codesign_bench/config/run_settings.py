@@ -19,7 +19,9 @@ class RunSettings:
     evaluations: int = 25
     """Number of evaluations, not counting the first, which evaluates the untrained policy."""
     fine_tuning_steps: int = 100_000
-    """Budget of cells that train on a single instance (--finetune, --scratch)."""
+    """Budget of cells that train at a single place (--finetune, --scratch)."""
+    fine_tuning_instances: int = 1
+    """Instances at that place, on which such a cell trains and is evaluated; the axes set it."""
     tradeoff_scale: float = 1.0
     """K of equation 1; used only with --alpha, since the paper has K = 0 elsewhere."""
     threads: int = 1
@@ -35,7 +37,7 @@ class RunSettings:
             raise ValueError(f"device must be one of {', '.join(DEVICES)}, not '{self.device}'")
         if self.instances not in (EVALUATION, VALIDATION):
             raise ValueError(f"instances must be {EVALUATION} or {VALIDATION}, not '{self.instances}'")
-        for name in ("steps", "evaluations", "fine_tuning_steps", "threads"):
+        for name in ("steps", "evaluations", "fine_tuning_steps", "fine_tuning_instances", "threads"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
         if self.tradeoff_scale < 0.0:

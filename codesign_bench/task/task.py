@@ -136,7 +136,11 @@ class Task(ABC):
         raise UserError(f"--cutout needs a task whose goals or starts are positions; '{self.name}' has none")
 
     def fine_tuning_instances(self) -> Floats:
-        """Return the (b, I) instances outside the training region on which policies are fine-tuned (section 5.2).
+        """Return instances outside the training region on which policies are fine-tuned (section 5.2).
+
+        Returns:
+            (p, k, I): p places with k instances each. The first instance of a place is the place itself; the others
+            are close to it, so that "solved" is a rate instead of the outcome of one episode.
 
         Raises:
             UserError: the task has none.

@@ -15,6 +15,7 @@ import pytest
 from scipy import stats
 
 from builders import offered
+from codesign_bench.cell.axes import FINE_TUNING_INSTANCES
 from codesign_bench.errors import UserError
 from codesign_bench.method import Problem
 from codesign_bench.registry import presented
@@ -245,6 +246,17 @@ def test_a_task_has_a_region_and_a_cutout_if_and_only_if_it_names_a_position(tas
         for refused in (lambda: task.in_region(instances), lambda: task.in_cutout(instances, 0.5)):
             with pytest.raises(UserError, match=f"'{task.name}' (are positions|has none)"):
                 refused()
+
+
+def test_fine_tuning_places_have_several_instances_all_out_of_the_training_region(task: Task) -> None:
+    if type(task).fine_tuning_instances is Task.fine_tuning_instances:
+        with pytest.raises(UserError, match=f"task '{task.name}' has no fine-tuning instances"):
+            task.fine_tuning_instances()
+    else:
+        places = task.fine_tuning_instances()
+        assert places.shape[1] >= FINE_TUNING_INSTANCES
+        assert places.shape[2] == task.instance_space.size
+        assert not task.in_region(places.reshape(-1, places.shape[2])).any()
 
 
 def test_the_region_ends_where_instances_do(cutout_task: Task) -> None:

@@ -99,8 +99,10 @@ def test_the_frame_puts_the_papers_real_starts_into_the_region_and_its_hard_ones
     for x, minus_y in ((-0.110, -0.803), (-0.339, -0.588), (0.155, -0.731), (0.211, -0.633)):  # Table of real starts.
         assert fetch.CUBE_X[0] < x < fetch.CUBE_X[1]
         assert fetch.CUBE_Y[0] - 0.004 < -minus_y < fetch.CUBE_Y[1] + 0.004
-    hard = load_task("fetch_cube").fine_tuning_instances()
-    np.testing.assert_allclose(hard, [[-0.167, 0.833], [-0.129, 0.843], [0.430, 0.707], [0.415, 0.590]])
+    places = load_task("fetch_cube").fine_tuning_instances()
+    np.testing.assert_allclose(places[:, 0], [[-0.167, 0.833], [-0.129, 0.843], [0.430, 0.707], [0.415, 0.590]])
+    np.testing.assert_allclose(np.linalg.norm(places - places[:, :1], axis=2)[:, 1:], fetch.FINE_TUNING_RADIUS)
+    hard = places.reshape(-1, 2)
     assert np.linalg.norm(hard, axis=1).min() > fetch.GOAL_DISTANCE
     low, high = load_task("fetch_cube").instance_space.bounds
     assert (((hard < low) | (hard > high)).any(axis=1)).all(), "outside the training region"
@@ -126,7 +128,7 @@ def test_material_by_hand() -> None:
 def test_every_tool_starts_clear_of_its_cube_and_within_the_hands_reach() -> None:
     task, designs = load_task("fetch_cube"), many_designs(32)
     starts = task.sample_instances(np.random.default_rng(1), len(designs))
-    starts[:4] = task.fine_tuning_instances()
+    starts[:4] = task.fine_tuning_instances()[:, 0]
     episodes, slots, places = Episodes(task, 8), np.arange(8), []
     simulator: Any = episodes.simulator
     for first in range(0, len(designs), slots.size):

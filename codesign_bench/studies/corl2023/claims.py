@@ -11,7 +11,7 @@ from math import prod
 from codesign_bench.claims import comparison, deployment, fine_tuning, tools, tradeoff, zero_shot
 from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.statistics import run_command
-from codesign_bench.studies.corl2023.members import OURS, PRIOR, SEEDS, SHARED, STARTS, TASKS
+from codesign_bench.studies.corl2023.members import OURS, PRIOR, SEEDS, SEEDS_FINE_TUNING, SHARED, STARTS, TASKS
 from codesign_bench.studies.corl2023.protocol import PROTOCOL
 from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 
@@ -38,10 +38,10 @@ def _listed(option: str, values: tuple[float, ...]) -> str:
 CUTOUTS = run_command(OURS, FETCH, FEW_SEEDS, _listed("cutout", FRACTIONS))
 TRADEOFFS = run_command(OURS, CATCH, FEW_SEEDS, _listed("alpha", ALPHAS))
 FINE_TUNED = (
-    run_command(OURS, FETCH, fine_tuning.SEEDS_TO_DECIDE),
-    run_command(OURS, FETCH, fine_tuning.SEEDS_TO_DECIDE, _listed("finetune", STARTS)),
+    run_command(OURS, FETCH, SEEDS_FINE_TUNING),
+    run_command(OURS, FETCH, SEEDS_FINE_TUNING, _listed("finetune", STARTS)),
 )
-FROM_SCRATCH = (*FINE_TUNED, run_command(OURS, FETCH, fine_tuning.SEEDS_TO_DECIDE, _listed("scratch", STARTS)))
+FROM_SCRATCH = (*FINE_TUNED, run_command(OURS, FETCH, SEEDS_FINE_TUNING, _listed("scratch", STARTS)))
 
 
 def _against(baseline: str, final: str, faster: str) -> Iterator[Claim]:

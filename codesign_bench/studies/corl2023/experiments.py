@@ -1,4 +1,4 @@
-"""The paper's experiments as data: the cells of each, in order, with the paper's numbers of seeds."""
+"""The paper's experiments as data: the cells of each, in order, with the paper's numbers of seeds, or more."""
 
 from __future__ import annotations
 
@@ -8,7 +8,15 @@ from pathlib import Path
 from codesign_bench.cell.cell import Cell
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.console import Log
-from codesign_bench.studies.corl2023.members import METHODS, OURS, SEEDS, STARTS, TASKS
+from codesign_bench.studies.corl2023.members import (
+    METHODS,
+    OURS,
+    SEEDS,
+    SEEDS_FINE_TUNING,
+    SEEDS_ON_THE_ARM,
+    STARTS,
+    TASKS,
+)
 from codesign_bench.studies.corl2023.protocol import PROTOCOL
 from codesign_bench.studies.corl2023.real_robot import REAL_ROBOT
 from codesign_bench.study.experiment import Experiment, Grid
@@ -87,12 +95,12 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         ("fine_tuning",),
         "section 'Generalization to unseen goals', fine-tuning",
         (
-            (Grid(("fetch_cube",), (OURS,), FEW_SEEDS),),
+            (Grid(("fetch_cube",), (OURS,), tuple(range(SEEDS_FINE_TUNING))),),
             (
                 Grid(
                     ("fetch_cube",),
                     (OURS,),
-                    FEW_SEEDS,
+                    tuple(range(SEEDS_FINE_TUNING)),
                     (
                         *(Variant.of(finetune=number) for number in STARTS),
                         *(Variant.of(scratch=number) for number in STARTS),
@@ -118,7 +126,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
     "deployment": Experiment(
         ("deployment",),
         "section 'Evaluation on a real robot'",
-        ((Grid(ON_AN_ARM, (OURS,), ONE_SEED),),),
+        ((Grid(ON_AN_ARM, (OURS,), tuple(range(SEEDS_ON_THE_ARM))),),),
         measures=(deploy,),
     ),
     "baseline_sweep": Experiment(

@@ -12,6 +12,8 @@ import pytest
 from rich.console import Console
 
 from builders import VERSION_0_1_0
+from codesign_bench.claims import deployment
+from codesign_bench.claims.fine_tuning import SEEDS_TO_DECIDE
 from codesign_bench.storage.records import CellRecord
 from codesign_bench.studies.corl2023 import experiments
 from codesign_bench.studies.corl2023.experiments import EXPERIMENTS
@@ -35,8 +37,9 @@ def test_the_papers_protocol() -> None:
     assert {cell.task for cell in curves} == set(TASKS)
     assert variants("generalization") == {f"cutout-{share:.2f}": 3 for share in (0.1, 0.2, 0.4, 0.6, 0.8, 0.9)}
     assert variants("tradeoff") == {f"alpha-{alpha:.2f}": 3 for alpha in (0.0, 0.3, 0.7, 1.0)}
-    starts = {f"{kind}-{start}": 3 for kind in ("finetune", "scratch") for start in (1, 2, 3, 4)}
-    assert variants("fine_tuning") == {"default": 3, **starts}
+    starts = {f"{kind}-{start}": SEEDS_TO_DECIDE for kind in ("finetune", "scratch") for start in (1, 2, 3, 4)}
+    assert variants("fine_tuning") == {"default": SEEDS_TO_DECIDE, **starts}
+    assert variants("deployment") == {"default": deployment.FEWEST_SEEDS}
 
 
 def test_tasks_have_what_their_experiments_ask_for() -> None:

@@ -57,6 +57,7 @@ OF_NO_MODULE = {
     "tests/results/test_ship_cells.py": "of the script results/ship_cells.py",
     "tests/stats/test_coverage.py": "of all intervals, beside the page on statistics",
     "tests/stats/test_rliable.py": "of all statistics, beside another library's",
+    "tests/sweep/test_faults.py": "of all file operations of a sweep",
     "tests/storage/test_version_0_1_0.py": "of the whole program, on results of an earlier version",
     "tests/studies/corl2023/test_tables.py": "of several modules of data, beside the paper's tables",
     "tests/sweep/test_resume.py": "of whole sweeps that are killed",

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from codesign_bench.config.run_settings import EVALUATION
 from codesign_bench.errors import UserError
-from codesign_bench.storage.layout import CELL_PATTERN, CURVE_FILE, POLICY_FILE, is_locked
+from codesign_bench.storage.layout import CELL_PATTERN, CURVE_FILE, POLICY_FILE
+from codesign_bench.storage.locks import is_locked
 from codesign_bench.storage.records import CELL_FILE, DONE, INTERRUPTED, RUNNING, CellRecord
 
 

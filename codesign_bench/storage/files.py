@@ -12,6 +12,9 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+PARTIAL = ".partial"
+"""How names of unfinished files end."""
+
 
 @contextmanager
 def replacing(path: Path, *, durable: bool = True) -> Iterator[BinaryIO]:
@@ -19,7 +22,7 @@ def replacing(path: Path, *, durable: bool = True) -> Iterator[BinaryIO]:
 
     `durable` waits until the content is on disk.
     """
-    descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-", suffix=".partial")
+    descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-", suffix=PARTIAL)
     try:
         with os.fdopen(descriptor, "wb") as stream:
             yield stream
@@ -49,9 +52,19 @@ def dump_json(values: Any, indent: int | None = None) -> str:
     return json.dumps(values, indent=indent, default=_plain)
 
 
+def partial_pattern(name: str = "") -> str:
+    """Return the pattern of the unfinished files that `replacing` makes: all of them, or those that become `name`."""
+    return f".{name}-*{PARTIAL}" if name else f".*{PARTIAL}"
+
+
+def is_partial(name: str) -> bool:
+    """Return whether an unfinished file of `replacing` may have this name."""
+    return name.startswith(".") and name.endswith(PARTIAL)
+
+
 def remove_partial_files(folder: Path) -> None:
     """Remove unfinished files that a killed process left in `folder`; call it only while holding its lock."""
-    for leftover in folder.glob(".*.partial"):
+    for leftover in folder.glob(partial_pattern()):
         leftover.unlink(missing_ok=True)
 
 

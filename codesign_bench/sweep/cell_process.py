@@ -12,6 +12,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,14 +25,17 @@ from codesign_bench.errors import UserError
 from codesign_bench.machine import host_facts, package_versions
 from codesign_bench.plugins import import_modules
 from codesign_bench.processes import EXIT_ORPHANED
-from codesign_bench.storage.checkpoint import remove_checkpoint
 from codesign_bench.storage.files import remove_partial_files
-from codesign_bench.storage.layout import CHECKPOINT_FILE, LOCK_FILE, LOG_FILE, PROGRESS_FILE, cell_lock
+from codesign_bench.storage.layout import remove_leftovers
+from codesign_bench.storage.locks import locked
 from codesign_bench.storage.provenance import same_conditions
 from codesign_bench.storage.records import DONE, FAILED, CellRecord, Failure, Timings, now
+from codesign_bench.storage.system_errors import is_momentary
 from codesign_bench.sweep.training import CellRun
 
 EXIT_DONE, EXIT_FAILED, EXIT_REFUSED, EXIT_BUSY = 0, 1, 2, 75
+EXIT_SYSTEM_ERROR = 100
+"""Plus the number of an error of the system. An exit code tells the reason even where nothing can be written."""
 LOCK_SECONDS = 2.0
 """Longer than `status` holds the lock to check it."""
 
@@ -44,12 +48,18 @@ def main(arguments: list[str] | None = None) -> int:
     cell_json, out, *options = sys.argv[1:] if arguments is None else arguments
     cell = Cell.from_json(cell_json)
     folder = cell.folder(Path(out))
-    folder.mkdir(parents=True, exist_ok=True)
     try:
-        with cell_lock(folder).acquire(timeout=LOCK_SECONDS):
+        folder.mkdir(parents=True, exist_ok=True)
+        with locked(folder, LOCK_SECONDS):
             return run_locked(cell, folder, retry="retry" in options)
     except filelock.Timeout:
         return EXIT_BUSY
+    except OSError as error:
+        if error.errno is None:
+            raise
+        with suppress(OSError):
+            traceback.print_exc()
+        return EXIT_SYSTEM_ERROR + error.errno
 
 
 def run_locked(cell: Cell, folder: Path, *, retry: bool) -> int:
@@ -115,14 +125,15 @@ def _run_and_record(resolved: ResolvedCell, folder: Path, record: CellRecord) ->
         run = CellRun(resolved, folder)
         run.finish()
     except Exception as error:
+        if isinstance(error, OSError) and is_momentary(error.errno):
+            raise  # The record says that the cell is running; without its lock this means that it was interrupted.
         message = str(error) if isinstance(error, UserError) else traceback.format_exception_only(error)[-1].strip()
         reached = {} if run is None else {"env_steps": run.progress.env_steps, "timings": run.timings()}
         record.ended(FAILED, failure=Failure(message, traceback.format_exc()), **reached).write(folder)
         return EXIT_FAILED
     record.ended(DONE, env_steps=run.progress.env_steps, timings=run.timings()).write(folder)
-    remove_checkpoint(folder / CHECKPOINT_FILE)
-    for name in (PROGRESS_FILE, LOG_FILE, LOCK_FILE):
-        (folder / name).unlink(missing_ok=True)
+    with suppress(OSError):  # the cell is done; the next sweep tries again
+        remove_leftovers(folder)
     return EXIT_DONE
 
 
@@ -143,8 +154,9 @@ def start() -> None:
     faulthandler.enable()
     _end_with_parent()
     code = main()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    with suppress(OSError, ValueError):  # the log is on a full disk, or closed
+        sys.stdout.flush()
+        sys.stderr.flush()
     os._exit(code)  # nothing is left to clean up, and a library's exit handler could hang
 
 

@@ -17,8 +17,9 @@ from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores
 from codesign_bench.registry import IMPORTS_VARIABLE
 from codesign_bench.storage.checkpoint import check_checkpoint
-from codesign_bench.storage.layout import CHECKPOINT_FILE, CURVE_FILE, is_locked, open_folder
-from codesign_bench.storage.records import DONE, FAILED, CellRecord
+from codesign_bench.storage.layout import CHECKPOINT_FILE, CURVE_FILE, open_folder, sweep_leftovers
+from codesign_bench.storage.locks import HOLDER_FILE, has_locks, is_locked
+from codesign_bench.storage.records import DONE, FAILED, INTERRUPTED, CellRecord
 from codesign_bench.sweep.backends import Backend, WorkersDied, make_backend
 from codesign_bench.sweep.progress import ProgressDisplay
 from codesign_bench.sweep.workers import BUSY, Job, Outcome
@@ -36,30 +37,54 @@ class Plan:
     done: list[Cell]
     failed: dict[Cell, str]
     """Cells that failed earlier and are not retried, with their error messages."""
+    unusable: dict[Cell, str]
+    """Cells whose files cannot be read, with the reasons."""
     pending: list[ResolvedCell]
+
+
+@dataclass(frozen=True)
+class Trouble:
+    """The cells that are not done at the end of a sweep, with the reasons."""
+
+    failed: dict[Cell, str]
+    interrupted: dict[Cell, str]
+    """Cells that the same command resumes."""
 
 
 def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = False) -> Plan:
     """Sort `cells` into done, failed and pending ones in `out`, before anything runs.
 
     Raises:
-        UserError: a stored cell has another configuration, or a cell file or checkpoint is damaged.
+        UserError: a stored cell has another configuration, or one that cells start from is not done.
     """
-    plan = Plan([], {}, [])
-    records = {resolved.cell: CellRecord.read(resolved.cell.folder(out)) for resolved in cells}
-    _refuse_other_configurations(cells, records, out)
-    _refuse_without_pretrained([resolved.cell for resolved in cells], out)
+    plan = Plan([], {}, {}, [])
+    records: dict[Cell, CellRecord | None] = {}
     for resolved in cells:
-        cell = resolved.cell
-        record = records[cell]
-        if record is not None and record.status == DONE:
-            plan.done.append(cell)
-        elif record is not None and record.failure is not None and not retry_failed:
-            plan.failed[cell] = record.failure.message
-        else:
-            check_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is reported here, not during the sweep
-            plan.pending.append(resolved)
+        try:
+            records[resolved.cell] = CellRecord.read(resolved.cell.folder(out))
+        except UserError as error:
+            plan.unusable[resolved.cell] = str(error)
+    readable = [resolved for resolved in cells if resolved.cell in records]
+    _refuse_other_configurations(readable, records, out)
+    _refuse_without_pretrained([resolved.cell for resolved in readable], out)
+    for resolved in readable:
+        _sort_into(plan, resolved, records[resolved.cell], out, retry_failed=retry_failed)
     return plan
+
+
+def _sort_into(plan: Plan, resolved: ResolvedCell, record: CellRecord | None, out: Path, *, retry_failed: bool) -> None:
+    cell = resolved.cell
+    if record is not None and record.status == DONE:
+        plan.done.append(cell)
+    elif record is not None and record.failure is not None and not retry_failed:
+        plan.failed[cell] = record.failure.message
+    else:
+        try:
+            check_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is told here, not during the sweep
+        except UserError as error:
+            plan.unusable[cell] = str(error)
+        else:
+            plan.pending.append(resolved)
 
 
 def split_cores(cores: int, cells: int, threads: int, jobs: int | None) -> tuple[int, str]:
@@ -105,27 +130,30 @@ def run_sweep(
     chosen = make_backend(backend, used_jobs, scheduler)
     say = printer(console)
     say(f"{len(cells)} cells, {len(plan.done)} of them already done; results in {out}")
-    failures = dict(plan.failed)
+    for cell in plan.done:
+        sweep_leftovers(cell.folder(out))
+    trouble = Trouble(plan.failed | plan.unusable, {})
     if plan.pending:
         say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
+        if not has_locks(out):
+            say(f"the file system of {out} has no locks: each running cell is guarded by a file, {HOLDER_FILE}")
         imported = os.environ.get(IMPORTS_VARIABLE, "")
         queue = [Job(resolved.cell, str(out), retry_failed, imported) for resolved in plan.pending]
         budgets = {resolved.cell: resolved.config.run.steps for resolved in plan.pending}
         with chosen as workers, ProgressDisplay(console, out, budgets) as display:
-            failures |= _run_queue(queue, workers, display)
-    return _conclude(say, len(cells), failures, plan.failed)
+            _run_queue(queue, workers, display, trouble)
+    return _conclude(say, len(cells), trouble, plan)
 
 
-def _run_queue(queue: list[Job], workers: Backend, display: ProgressDisplay) -> dict[Cell, str]:
-    """Run all jobs, those of cells that another sweep is running last; return the failures."""
-    failures: dict[Cell, str] = {}
+def _run_queue(queue: list[Job], workers: Backend, display: ProgressDisplay, trouble: Trouble) -> None:
+    """Run all jobs, those of cells that another sweep is running last; add to the trouble."""
     waiting_told = False
     broken = 0
     while queue:
         free = [job for job in queue if not is_locked(job.cell.folder(Path(job.out)))]
         if not free:
             if not waiting_told:
-                display.say(f"waiting for {len(queue)} cells that another sweep is running")
+                display.say(f"waiting for {len(queue)} cells that another sweep is running{_holders(queue)}")
             waiting_told = True
             time.sleep(LOCK_POLL_SECONDS)
             continue
@@ -135,28 +163,39 @@ def _run_queue(queue: list[Job], workers: Backend, display: ProgressDisplay) -> 
                 if outcome.status != BUSY:
                     ended += 1
                     queue = [job for job in queue if job.cell != outcome.cell]
-                    _tell(outcome, display, failures)
+                    _tell(outcome, display, trouble)
         except WorkersDied as error:
             broken = 0 if ended else broken + 1
             if broken == MAX_BROKEN_POOLS:
                 raise RuntimeError("worker processes died repeatedly before any cell ended") from error
             display.say("a worker process died; unfinished cells resume from their checkpoints")
-    return failures
 
 
-def _tell(outcome: Outcome, display: ProgressDisplay, failures: dict[Cell, str]) -> None:
+def _holders(queue: Sequence[Job]) -> str:
+    """Return where to look if no other sweep is running: files guard cells where the file system has no locks."""
+    files = [file for job in queue if (file := job.cell.folder(Path(job.out)) / HOLDER_FILE).exists()]
+    return f"; if none is, remove {files[0]}, which names its host and process" if files else ""
+
+
+def _tell(outcome: Outcome, display: ProgressDisplay, trouble: Trouble) -> None:
     display.ended(outcome.cell)
     if outcome.status == FAILED:
-        failures[outcome.cell] = outcome.message
+        trouble.failed[outcome.cell] = outcome.message
         display.say(f"failed  {outcome.cell.name}  {_one_line(outcome.message)}")
+    elif outcome.status == INTERRUPTED:
+        trouble.interrupted[outcome.cell] = outcome.message
+        display.say(f"interrupted  {outcome.cell.name}  {_one_line(outcome.message)}")
     else:
         display.say(f"done    {outcome.cell.name}  {_last_row(outcome.cell, display.out)}")
 
 
 def _last_row(cell: Cell, out: Path) -> str:
-    last = pd.read_csv(cell.folder(out) / CURVE_FILE).iloc[-1]
-    outcome = f"return {last['return_mean']:.2f}, success {last['success_rate']:.2f}"
-    return f"{outcome}, {last['env_steps']:,.0f} steps, {last['wall_s']:.0f} s"
+    try:
+        last = pd.read_csv(cell.folder(out) / CURVE_FILE).iloc[-1]
+        outcome = f"return {last['return_mean']:.2f}, success {last['success_rate']:.2f}"
+        return f"{outcome}, {last['env_steps']:,.0f} steps, {last['wall_s']:.0f} s"
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        return f"its curve cannot be read ({_one_line(str(error))})"
 
 
 def _refuse_other_configurations(
@@ -187,15 +226,20 @@ def _refuse_without_pretrained(cells: Sequence[Cell], out: Path) -> None:
                 )
 
 
-def _conclude(say: Log, cells: int, failures: dict[Cell, str], earlier: dict[Cell, str]) -> int:
-    for cell, message in earlier.items():
+def _conclude(say: Log, cells: int, trouble: Trouble, plan: Plan) -> int:
+    for cell, message in plan.failed.items():
         say(f"failed earlier  {cell.name}  {_one_line(message)}")
-    if not failures:
-        say(f"all {cells} cells done")
-        return EXIT_ALL_DONE
-    hint = "; --retry-failed runs them again" if failures else ""
-    say(f"{len(failures)} of {cells} cells failed; each cell.json has the traceback{hint}")
-    return EXIT_SOME_FAILED
+    for cell, message in plan.unusable.items():
+        say(f"failed  {cell.name}  {_one_line(message)}")
+    if trouble.interrupted:
+        say(f"{len(trouble.interrupted)} of {cells} cells interrupted; the same command resumes them")
+    if trouble.failed:
+        told = "cell.json has the traceback of each that began, and --retry-failed runs it again"
+        say(f"{len(trouble.failed)} of {cells} cells failed; {told}")
+    if trouble.failed or trouble.interrupted:
+        return EXIT_SOME_FAILED
+    say(f"all {cells} cells done")
+    return EXIT_ALL_DONE
 
 
 def _one_line(text: str) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -180,7 +181,8 @@ class CellRun:
             "return_mean": last.get("return_mean"),
             "success_rate": last.get("success_rate"),
         }
-        write_json(self.folder / PROGRESS_FILE, content, durable=False)
+        with suppress(OSError):  # nothing depends on it
+            write_json(self.folder / PROGRESS_FILE, content, durable=False)
 
 
 def _results(cell: Cell, folder: Path) -> Path:

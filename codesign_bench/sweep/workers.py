@@ -8,8 +8,10 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import filelock
 
@@ -17,8 +19,10 @@ from codesign_bench.cell.cell import Cell
 from codesign_bench.errors import UserError
 from codesign_bench.processes import end_with, thread_environment
 from codesign_bench.registry import IMPORTS_VARIABLE
-from codesign_bench.storage.layout import LOG_FILE, PROGRESS_FILE, cell_lock, is_locked
-from codesign_bench.storage.records import DONE, FAILED, RUNNING, CellRecord, Failure
+from codesign_bench.storage.layout import LOG_FILE, PROGRESS_FILE
+from codesign_bench.storage.locks import is_locked, locked
+from codesign_bench.storage.records import DONE, FAILED, INTERRUPTED, RUNNING, CellRecord, Failure
+from codesign_bench.storage.system_errors import in_words, is_momentary
 from codesign_bench.sweep import cell_process
 
 BUSY = "busy"
@@ -44,7 +48,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one cell ended: "done", "failed" or "busy"."""
+    """How one cell ended: "done", "failed", "interrupted" or "busy"."""
 
     cell: Cell
     status: str
@@ -61,12 +65,25 @@ def prepare_worker(main_pid: int) -> None:
 
 
 def run_job(job: Job) -> Outcome:
-    """Run the job's cell in a separate process and return its outcome; a dead process is recorded as a failure."""
+    """Run the job's cell in a separate process and return its outcome; a dead process is recorded as a failure.
+
+    What the system refuses in the cell's folder is the outcome of this cell, so that other cells go on.
+    """
     folder = job.cell.folder(Path(job.out))
+    try:
+        return _run(job, folder)
+    except UserError as error:
+        return Outcome(job.cell, FAILED, str(error))
+    except OSError as error:
+        return _refused_by_the_system(job.cell, error.errno, in_words(error))
+
+
+def _run(job: Job, folder: Path) -> Outcome:
     folder.mkdir(parents=True, exist_ok=True)
     if is_locked(folder):
         return Outcome(job.cell, BUSY)
-    (folder / PROGRESS_FILE).unlink(missing_ok=True)
+    with suppress(OSError):  # nothing depends on it
+        (folder / PROGRESS_FILE).unlink(missing_ok=True)
     code = _run_process(job, folder)
     if code == cell_process.EXIT_DONE:
         return Outcome(job.cell, DONE)
@@ -76,12 +93,27 @@ def run_job(job: Job) -> Outcome:
         return Outcome(job.cell, FAILED, message)
     if code == cell_process.EXIT_REFUSED:
         return Outcome(job.cell, FAILED, _end_of_log(folder).strip())
+    if code > cell_process.EXIT_SYSTEM_ERROR:
+        number = code - cell_process.EXIT_SYSTEM_ERROR
+        return _refused_by_the_system(job.cell, number, f"{os.strerror(number)}: {folder}")
     return Outcome(job.cell, FAILED, _record_death(folder, code))
+
+
+def _refused_by_the_system(cell: Cell, number: int | None, message: str) -> Outcome:
+    return Outcome(cell, INTERRUPTED if is_momentary(number) else FAILED, message)
+
+
+def _open_log(folder: Path) -> BinaryIO:
+    """Return the log of a cell's process, or nothing's where it cannot be written: no result depends on it."""
+    try:
+        return open(folder / LOG_FILE, "wb")
+    except OSError:
+        return open(os.devnull, "wb")
 
 
 def _run_process(job: Job, folder: Path) -> int:
     command = [sys.executable, "-c", START, json.dumps(sys.path), job.cell.to_json(), job.out]
-    with open(folder / LOG_FILE, "wb") as log:
+    with _open_log(folder) as log:
         process = subprocess.Popen(
             [*command, *(["retry"] if job.retry_failed else [])],
             stdin=subprocess.PIPE,  # never written to; it closes when the parent dies, which ends the process
@@ -108,7 +140,7 @@ def _record_death(folder: Path, code: int) -> str:
     time.sleep(SETTLE_SECONDS)
     message = describe_exit(code)
     try:
-        with cell_lock(folder).acquire(timeout=0):
+        with locked(folder):
             record = CellRecord.read(folder)
             if record is not None and record.status == RUNNING:
                 trace = _end_of_log(folder) or message
@@ -117,6 +149,8 @@ def _record_death(folder: Path, code: int) -> str:
                 message = f"{message}: {_end_of_log(folder).strip()}"
     except (filelock.Timeout, UserError) as error:
         return f"{message} ({error})"
+    except OSError as error:
+        return f"{message} (not recorded: {in_words(error)})"
     return message
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from codesign_bench.report.page import code_spans
-from codesign_bench.storage.layout import cell_lock
+from codesign_bench.storage.locks import locked
 from codesign_bench.storage.records import FAILED, RUNNING, Failure, Timings
 from reports import ATTACK, Reader, make_cell, report
 
@@ -38,7 +38,7 @@ def test_the_page_is_whole(page: str) -> None:
 
 def test_a_folder_in_which_nothing_is_finished_still_gives_a_page(tmp_path: Path) -> None:
     make_cell(tmp_path / "runs", 0, status=FAILED, failure=Failure("no luck", "line 1\nline 2"))
-    with cell_lock(make_cell(tmp_path / "runs", 1, status=RUNNING, timings=Timings())):
+    with locked(make_cell(tmp_path / "runs", 1, status=RUNNING, timings=Timings())):
         text = Reader(report(tmp_path / "runs")).text
     assert "1 failed, 1 running" in text
     assert "No cell has finished yet" in text

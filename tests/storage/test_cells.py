@@ -10,7 +10,7 @@ from builders import BUDGET, rising, store_cell
 from codesign_bench.config.settings import Sourced, StoredConfig
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import find_cells, open_cell, reported_cells
-from codesign_bench.storage.layout import cell_lock
+from codesign_bench.storage.locks import locked
 from codesign_bench.storage.records import RUNNING
 
 
@@ -25,7 +25,7 @@ def test_cells_are_found_in_order_and_what_cannot_be_read_is_passed_over(tmp_pat
 def test_a_running_cell_that_nobody_runs_is_interrupted(tmp_path: Path) -> None:
     folder = store_cell(tmp_path, status=RUNNING)
     assert open_cell(folder).status == "interrupted"
-    with cell_lock(folder):
+    with locked(folder):
         assert open_cell(folder).status == "running"
     assert open_cell(folder).status == "interrupted"
     assert open_cell(store_cell(tmp_path, seed=1)).status == "done"

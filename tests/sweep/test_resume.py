@@ -15,7 +15,8 @@ import pandas as pd
 import pytest
 
 from codesign_bench import load_results
-from codesign_bench.storage.layout import CHECKPOINT_FILE, is_locked
+from codesign_bench.storage.layout import CHECKPOINT_FILE
+from codesign_bench.storage.locks import is_locked
 from codesign_bench.storage.records import CellRecord
 from toy import Gate
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,8 +11,10 @@ from builders import sweep
 from builders import toy_cells as cells
 from codesign_bench import load_results
 from codesign_bench.cell.cell import Cell, resolve_cells
+from codesign_bench.cell.variant import Variant
 from codesign_bench.errors import UserError
-from codesign_bench.storage.layout import CHECKPOINT_FILE, open_folder
+from codesign_bench.storage.layout import CHECKPOINT_FILE, LOG_FILE, MARKER_FILE, PROGRESS_FILE, open_folder
+from codesign_bench.storage.locks import LOCK_FILE
 from codesign_bench.storage.records import CellRecord
 from codesign_bench.sweep.runner import make_plan, split_cores
 from toy import ToyReach
@@ -98,14 +101,87 @@ def test_cells_of_another_version_of_their_task_are_refused(tmp_path: Path, monk
         make_plan(resolve_cells(cells(1)), tmp_path)
 
 
-def test_a_truncated_checkpoint_is_refused_before_anything_runs(tmp_path: Path) -> None:
+@pytest.mark.parametrize("damaged", [CHECKPOINT_FILE, "cell.json"])
+def test_a_cell_with_a_damaged_file_fails_untouched_and_the_others_run(tmp_path: Path, damaged: str) -> None:
     open_folder(tmp_path)
-    folder = CELL.folder(tmp_path)
+    bad, good = cells(2)
+    folder = bad.folder(tmp_path)
     folder.mkdir(parents=True)
-    (folder / CHECKPOINT_FILE).write_bytes(b"\x10\x00")
-    with pytest.raises(UserError, match=CHECKPOINT_FILE):
-        sweep([CELL], tmp_path)
-    assert not (folder / "cell.json").exists()
+    (folder / damaged).write_bytes(b"\x10\x00")
+    code, text = sweep([bad, good], tmp_path)
+    assert code == 1
+    assert f"failed  {bad.name}  " in text
+    assert damaged in text
+    assert [path.name for path in folder.iterdir()] == [damaged]
+    assert stored(good, tmp_path).status == "done"
+
+
+def a_file_for_a_variant(cell: Cell, out: Path) -> None:
+    cell.folder(out).parent.parent.mkdir(parents=True)
+    cell.folder(out).parent.write_text("")
+
+
+def a_file_for_a_cell(cell: Cell, out: Path) -> None:
+    cell.folder(out).parent.mkdir(parents=True)
+    cell.folder(out).write_text("")
+
+
+def a_folder_for_a_lock(cell: Cell, out: Path) -> None:
+    (cell.folder(out) / LOCK_FILE).mkdir(parents=True)
+
+
+def a_folder_for_a_checkpoint(cell: Cell, out: Path) -> None:
+    (cell.folder(out) / CHECKPOINT_FILE).mkdir(parents=True)
+
+
+def a_folder_for_a_record(cell: Cell, out: Path) -> None:
+    (cell.folder(out) / "cell.json").mkdir(parents=True)
+
+
+def a_folder_for_a_curve(cell: Cell, out: Path) -> None:
+    (cell.folder(out) / "curve.csv" / "in it").mkdir(parents=True)
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [
+        a_file_for_a_variant,
+        a_file_for_a_cell,
+        a_folder_for_a_lock,
+        a_folder_for_a_checkpoint,
+        a_folder_for_a_record,
+        a_folder_for_a_curve,
+    ],
+)
+def test_a_cell_whose_folder_cannot_be_used_fails_with_the_reason_and_the_others_run(
+    tmp_path: Path, obstacle: Callable[[Cell, Path], None]
+) -> None:
+    bad, good = cells(1)[0], Cell("toy_reach", "toy_search", 1, Variant.of(alpha=0.5), steps=100)
+    open_folder(tmp_path)
+    obstacle(bad, tmp_path)
+    code, text = sweep([bad, good], tmp_path)
+    assert code == 1
+    (line,) = (line for line in text.splitlines() if line.startswith(f"failed  {bad.name}"))
+    assert any(reason in line for reason in ("Not a directory", "Is a directory", "File exists"))
+    assert "Traceback" not in text
+    assert stored(good, tmp_path).status == "done"
+
+
+@pytest.mark.parametrize("harmless", [PROGRESS_FILE, LOG_FILE])
+def test_a_file_on_which_nothing_depends_fails_no_cell(tmp_path: Path, harmless: str) -> None:
+    (CELL.folder(tmp_path) / harmless / "in it").mkdir(parents=True)
+    (tmp_path / MARKER_FILE).write_text("{}")
+    assert sweep([CELL], tmp_path)[0] == 0
+    assert stored(CELL, tmp_path).status == "done"
+
+
+def test_what_a_kill_left_of_a_finished_cell_is_swept_by_the_next_sweep(tmp_path: Path) -> None:
+    sweep([CELL], tmp_path)
+    before = {path.name for path in CELL.folder(tmp_path).iterdir()}
+    for name in (CHECKPOINT_FILE, PROGRESS_FILE, LOG_FILE, LOCK_FILE, ".cell.json-abc.partial"):
+        (CELL.folder(tmp_path) / name).write_bytes(b"of a process that was killed as it ended")
+    assert sweep([CELL], tmp_path)[0] == 0
+    assert {path.name for path in CELL.folder(tmp_path).iterdir()} == before
 
 
 @pytest.mark.parametrize(

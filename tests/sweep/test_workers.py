@@ -13,7 +13,8 @@ import pytest
 from builders import toy_cells
 from codesign_bench.cell.cell import Cell
 from codesign_bench.registry import IMPORTS_VARIABLE
-from codesign_bench.storage.layout import LOG_FILE, PROGRESS_FILE, cell_lock
+from codesign_bench.storage.layout import LOG_FILE, PROGRESS_FILE
+from codesign_bench.storage.locks import locked
 from codesign_bench.storage.records import CellRecord
 from codesign_bench.sweep.workers import Job, Outcome, describe_exit, prepare_worker, run_job
 
@@ -44,7 +45,7 @@ def test_a_cell_that_somebody_else_runs_is_left_alone(tmp_path: Path) -> None:
     cell = toy_cell()
     folder = cell.folder(tmp_path)
     folder.mkdir(parents=True)
-    with cell_lock(folder):
+    with locked(folder):
         assert run(cell, tmp_path) == Outcome(cell, "busy")
     assert not (folder / "cell.json").exists()
 

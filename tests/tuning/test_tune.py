@@ -20,7 +20,7 @@ from codesign_bench.cli import main
 from codesign_bench.errors import UserError
 from codesign_bench.registry import IMPORTS_VARIABLE
 from codesign_bench.storage.frames import load_evaluations
-from codesign_bench.storage.layout import is_locked
+from codesign_bench.storage.locks import is_locked
 from codesign_bench.study import Study, Tuning
 from codesign_bench.tuning.results import read_winners
 from codesign_bench.tuning.tune import budgets_of, tuning_of

@@ -1,0 +1,33 @@
+"""Errors of the operating system while a cell runs: which of them may be gone when the same command is repeated.
+
+A full disk, a quota or a device that does not answer says nothing about the cell, which can resume. A folder that
+belongs to somebody else, or a file in its place, stays as it is until the user does something.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+
+MOMENTARY = frozenset(
+    getattr(errno, name)
+    for name in (
+        *("ENOSPC", "EDQUOT", "EFBIG", "EIO", "ENXIO", "ENODEV", "EROFS", "EBUSY", "ETXTBSY"),
+        *("ESTALE", "EREMOTEIO", "ENOLCK", "ETIMEDOUT", "ECONNRESET", "ECONNREFUSED", "EHOSTDOWN", "EHOSTUNREACH"),
+        *("ENETDOWN", "ENETUNREACH", "ENOTCONN", "ESHUTDOWN", "EPIPE", "EPROTO", "ECOMM"),
+        *("EMFILE", "ENFILE", "ENOMEM", "ENOBUFS", "EAGAIN", "EINTR"),
+    )
+    if hasattr(errno, name)
+)
+"""Numbers of errors after which the same command may succeed: storage, network, and resources of the system."""
+
+
+def is_momentary(number: int | None) -> bool:
+    """Return whether the same command may succeed after the error with this number."""
+    return number in MOMENTARY
+
+
+def in_words(error: OSError) -> str:
+    """Return an error and its file in one line."""
+    reason = error.strerror or str(error) or type(error).__name__
+    return f"{reason}: {os.fsdecode(error.filename)}" if isinstance(error.filename, (str, bytes)) else reason

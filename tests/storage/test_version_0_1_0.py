@@ -27,11 +27,10 @@ MADE_BY = [
     ("gnn_ppo cma_rl cma_es", "push", "--seeds 2", SETTINGS),
     ("gnn_ppo", "fetch_cube", "--seeds 1", GNN_PPO),
     ("gnn_ppo", "fetch_cube", "--seeds 1 --cutout 0.4", GNN_PPO),
-    ("gnn_ppo", "fetch_cube", "--seeds 1 --finetune 1 --scratch 1", GNN_PPO),
     ("gnn_ppo", "lift_cup", "--seeds 1", GNN_PPO),
     ("gnn_ppo", "catch_balls", "--seeds 1 --alpha 0.125", GNN_PPO),
 ]
-"""Methods, task, seeds and variant, settings."""
+"""Methods, task, seeds and variant, settings; besides, `--finetune 1 --scratch 1` on fetch_cube."""
 
 
 def has_changed(task: str) -> bool:
@@ -76,6 +75,16 @@ def test_a_policy_does_what_its_curve_says(cell: str) -> None:
     assert pd.read_csv(folder / EVALUATION_FILE)["return"].mean() == pytest.approx(
         told.last_evaluation()["return_mean"]
     )
+
+
+def test_fine_tuning_on_one_instance_is_refused_and_left_alone(
+    results: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = contents(results)
+    line = f"run --method gnn_ppo --task fetch_cube --seeds 1 --finetune 1 --scratch 1 --profile quick --set {GNN_PPO}"
+    assert main([*line.split(), "--out", str(results)]) == 2
+    assert "fine_tuning_instances: stored 1, requested 8" in capsys.readouterr().err
+    assert contents(results) == before
 
 
 @pytest.mark.parametrize(("methods", "task", "grid", "settings"), [row for row in MADE_BY if has_changed(row[1])])

@@ -27,6 +27,16 @@ def is_momentary(number: int | None) -> bool:
     return number in MOMENTARY
 
 
+def momentary_cause(error: BaseException) -> int | None:
+    """Return the number of the momentary error of the system that is, or led to, `error`; None if there is none."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError) and is_momentary(cause.errno):
+            return cause.errno
+        cause = cause.__cause__
+    return None
+
+
 def in_words(error: OSError) -> str:
     """Return an error and its file in one line."""
     reason = error.strerror or str(error) or type(error).__name__

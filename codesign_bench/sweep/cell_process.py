@@ -30,7 +30,7 @@ from codesign_bench.storage.layout import remove_leftovers
 from codesign_bench.storage.locks import locked
 from codesign_bench.storage.provenance import same_conditions
 from codesign_bench.storage.records import DONE, FAILED, CellRecord, Failure, Timings, now
-from codesign_bench.storage.system_errors import is_momentary
+from codesign_bench.storage.system_errors import momentary_cause
 from codesign_bench.sweep.training import CellRun
 
 EXIT_DONE, EXIT_FAILED, EXIT_REFUSED, EXIT_BUSY = 0, 1, 2, 75
@@ -54,12 +54,13 @@ def main(arguments: list[str] | None = None) -> int:
             return run_locked(cell, folder, retry="retry" in options)
     except filelock.Timeout:
         return EXIT_BUSY
-    except OSError as error:
-        if error.errno is None:
+    except Exception as error:
+        number = momentary_cause(error) or getattr(error, "errno", None)
+        if number is None and not isinstance(error, UserError):
             raise
         with suppress(OSError):
-            traceback.print_exc()
-        return EXIT_SYSTEM_ERROR + error.errno
+            print(error, file=sys.stderr) if number is None else traceback.print_exc()
+        return EXIT_REFUSED if number is None else EXIT_SYSTEM_ERROR + number
 
 
 def run_locked(cell: Cell, folder: Path, *, retry: bool) -> int:
@@ -125,7 +126,7 @@ def _run_and_record(resolved: ResolvedCell, folder: Path, record: CellRecord) ->
         run = CellRun(resolved, folder)
         run.finish()
     except Exception as error:
-        if isinstance(error, OSError) and is_momentary(error.errno):
+        if momentary_cause(error) is not None:
             raise  # The record says that the cell is running; without its lock this means that it was interrupted.
         message = str(error) if isinstance(error, UserError) else traceback.format_exception_only(error)[-1].strip()
         reached = {} if run is None else {"env_steps": run.progress.env_steps, "timings": run.timings()}

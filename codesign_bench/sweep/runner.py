@@ -20,7 +20,8 @@ from codesign_bench.storage.checkpoint import check_checkpoint
 from codesign_bench.storage.layout import CHECKPOINT_FILE, CURVE_FILE, open_folder, sweep_leftovers
 from codesign_bench.storage.locks import HOLDER_FILE, has_locks, is_locked
 from codesign_bench.storage.records import DONE, FAILED, INTERRUPTED, CellRecord
-from codesign_bench.sweep.backends import Backend, WorkersDied, make_backend
+from codesign_bench.storage.system_errors import momentary_cause
+from codesign_bench.sweep.backends import Backend, ClusterLost, WorkersDied, make_backend
 from codesign_bench.sweep.progress import ProgressDisplay
 from codesign_bench.sweep.workers import BUSY, Job, Outcome
 
@@ -38,7 +39,9 @@ class Plan:
     failed: dict[Cell, str]
     """Cells that failed earlier and are not retried, with their error messages."""
     unusable: dict[Cell, str]
-    """Cells whose files cannot be read, with the reasons."""
+    """Cells whose files are damaged or refused, with the reasons."""
+    unreadable: dict[Cell, str]
+    """Cells whose files cannot be read at the moment, with the reasons."""
     pending: list[ResolvedCell]
 
 
@@ -57,13 +60,13 @@ def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = 
     Raises:
         UserError: a stored cell has another configuration, or one that cells start from is not done.
     """
-    plan = Plan([], {}, {}, [])
+    plan = Plan([], {}, {}, {}, [])
     records: dict[Cell, CellRecord | None] = {}
     for resolved in cells:
         try:
             records[resolved.cell] = CellRecord.read(resolved.cell.folder(out))
         except UserError as error:
-            plan.unusable[resolved.cell] = str(error)
+            _set_aside(plan, resolved.cell, error)
     readable = [resolved for resolved in cells if resolved.cell in records]
     _refuse_other_configurations(readable, records, out)
     _refuse_without_pretrained([resolved.cell for resolved in readable], out)
@@ -82,9 +85,14 @@ def _sort_into(plan: Plan, resolved: ResolvedCell, record: CellRecord | None, ou
         try:
             check_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is told here, not during the sweep
         except UserError as error:
-            plan.unusable[cell] = str(error)
+            _set_aside(plan, cell, error)
         else:
             plan.pending.append(resolved)
+
+
+def _set_aside(plan: Plan, cell: Cell, error: UserError) -> None:
+    cells = plan.unusable if momentary_cause(error) is None else plan.unreadable
+    cells[cell] = str(error)
 
 
 def split_cores(cores: int, cells: int, threads: int, jobs: int | None) -> tuple[int, str]:
@@ -132,7 +140,7 @@ def run_sweep(
     say(f"{len(cells)} cells, {len(plan.done)} of them already done; results in {out}")
     for cell in plan.done:
         sweep_leftovers(cell.folder(out))
-    trouble = Trouble(plan.failed | plan.unusable, {})
+    trouble = Trouble(plan.failed | plan.unusable, dict(plan.unreadable))
     if plan.pending:
         say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
         if not has_locks(out):
@@ -164,6 +172,10 @@ def _run_queue(queue: list[Job], workers: Backend, display: ProgressDisplay, tro
                     ended += 1
                     queue = [job for job in queue if job.cell != outcome.cell]
                     _tell(outcome, display, trouble)
+        except ClusterLost as error:
+            display.say(str(error))
+            trouble.interrupted.update((job.cell, str(error)) for job in queue)
+            return
         except WorkersDied as error:
             broken = 0 if ended else broken + 1
             if broken == MAX_BROKEN_POOLS:
@@ -231,6 +243,8 @@ def _conclude(say: Log, cells: int, trouble: Trouble, plan: Plan) -> int:
         say(f"failed earlier  {cell.name}  {_one_line(message)}")
     for cell, message in plan.unusable.items():
         say(f"failed  {cell.name}  {_one_line(message)}")
+    for cell, message in plan.unreadable.items():
+        say(f"interrupted  {cell.name}  {_one_line(message)}")
     if trouble.interrupted:
         say(f"{len(trouble.interrupted)} of {cells} cells interrupted; the same command resumes them")
     if trouble.failed:

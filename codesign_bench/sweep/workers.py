@@ -22,7 +22,7 @@ from codesign_bench.registry import IMPORTS_VARIABLE
 from codesign_bench.storage.layout import LOG_FILE, PROGRESS_FILE
 from codesign_bench.storage.locks import is_locked, locked
 from codesign_bench.storage.records import DONE, FAILED, INTERRUPTED, RUNNING, CellRecord, Failure
-from codesign_bench.storage.system_errors import in_words, is_momentary
+from codesign_bench.storage.system_errors import in_words, is_momentary, momentary_cause
 from codesign_bench.sweep import cell_process
 
 BUSY = "busy"
@@ -72,10 +72,9 @@ def run_job(job: Job) -> Outcome:
     folder = job.cell.folder(Path(job.out))
     try:
         return _run(job, folder)
-    except UserError as error:
-        return Outcome(job.cell, FAILED, str(error))
-    except OSError as error:
-        return _refused_by_the_system(job.cell, error.errno, in_words(error))
+    except (UserError, OSError) as error:
+        status = FAILED if momentary_cause(error) is None else INTERRUPTED
+        return Outcome(job.cell, status, in_words(error) if isinstance(error, OSError) else str(error))
 
 
 def _run(job: Job, folder: Path) -> Outcome:
@@ -95,12 +94,8 @@ def _run(job: Job, folder: Path) -> Outcome:
         return Outcome(job.cell, FAILED, _end_of_log(folder).strip())
     if code > cell_process.EXIT_SYSTEM_ERROR:
         number = code - cell_process.EXIT_SYSTEM_ERROR
-        return _refused_by_the_system(job.cell, number, f"{os.strerror(number)}: {folder}")
+        return Outcome(job.cell, INTERRUPTED if is_momentary(number) else FAILED, f"{os.strerror(number)}: {folder}")
     return Outcome(job.cell, FAILED, _record_death(folder, code))
-
-
-def _refused_by_the_system(cell: Cell, number: int | None, message: str) -> Outcome:
-    return Outcome(cell, INTERRUPTED if is_momentary(number) else FAILED, message)
 
 
 def _open_log(folder: Path) -> BinaryIO:

@@ -6,7 +6,8 @@ import errno
 
 import pytest
 
-from codesign_bench.storage.system_errors import in_words, is_momentary
+from codesign_bench.errors import UserError
+from codesign_bench.storage.system_errors import in_words, is_momentary, momentary_cause
 
 
 @pytest.mark.parametrize("name", ["ENOSPC", "EDQUOT", "EIO", "ESTALE", "ENOLCK", "EROFS", "EMFILE"])
@@ -21,6 +22,16 @@ def test_what_the_user_must_mend_is_not(name: str) -> None:
 
 def test_an_error_without_a_number_is_not() -> None:
     assert not is_momentary(OSError("odd").errno)
+
+
+def test_the_cause_of_an_error_is_found_below_others() -> None:
+    full, refused = OSError(errno.ENOSPC, ""), PermissionError(errno.EACCES, "")
+    assert momentary_cause(full) == errno.ENOSPC
+    assert momentary_cause(refused) is None
+    assert momentary_cause(UserError("of the user's own")) is None
+    told = UserError("cannot read")
+    told.__cause__ = full
+    assert momentary_cause(told) == errno.ENOSPC
 
 
 def test_an_error_is_told_with_its_file() -> None:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -80,6 +83,77 @@ def test_a_killed_worker_costs_no_cell_and_changes_no_curve(cluster: Any, gate: 
     assert curves(here).equals(curves(there))
     code, text = sweep(cells(), there, backend="dask", scheduler=cluster.scheduler_address)
     assert (code, "4 of them already done" in text) == (0, True)
+
+
+def test_a_single_worker_does_the_work_and_not_the_main_process(
+    gate: Gate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(job: object) -> None:
+        raise AssertionError("the main process runs a cell")
+
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as running:
+        monkeypatch.setattr("codesign_bench.sweep.workers._run_process", refuse)
+        code, text = sweep(cells()[:1], tmp_path, backend="dask", scheduler=running.scheduler_address)
+    assert code == 0, text
+
+
+@pytest.fixture
+def scheduler(gate: Gate, tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A scheduler in a process of its own, with its address."""
+    where = tmp_path / "scheduler.json"
+    words = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
+    process = subprocess.Popen(
+        [*words, "--no-dashboard", "--scheduler-file", str(where)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        deadline = time.monotonic() + 120.0
+        while not (where.exists() and where.read_text().endswith("}")):
+            assert time.monotonic() < deadline, "waited in vain"
+            time.sleep(0.05)
+        yield json.loads(where.read_text())["address"], process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_a_scheduler_without_workers_gets_one_line(
+    scheduler: tuple[str, subprocess.Popen[bytes]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address, _ = scheduler
+    monkeypatch.setattr("codesign_bench.sweep.backends.WORKER_SECONDS", 0.5)
+    with pytest.raises(UserError, match=f"--scheduler {address}: it has no worker; start one with: dask worker"):
+        sweep(cells()[:1], tmp_path / "runs", backend="dask", scheduler=address)
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_killed_leaves_cells_interrupted_and_the_same_command_resumes(
+    scheduler: tuple[str, subprocess.Popen[bytes]], gate: Gate, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    address, process = scheduler
+    out = tmp_path / "runs"
+    words = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
+    worker = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def kill_the_scheduler() -> None:
+        while not list(out.glob(f"*/*/*/*/{PROGRESS_FILE}")):
+            time.sleep(0.05)
+        process.kill()
+
+    gate.close_at(200)
+    killer = threading.Thread(target=kill_the_scheduler, daemon=True)
+    killer.start()
+    try:
+        code, text = sweep(cells()[:2], out, backend="dask", scheduler=address)
+    finally:
+        worker.terminate()
+        worker.wait()
+    killer.join()
+    assert code == 1
+    assert f"the Dask scheduler {address} has gone" in text
+    assert "2 of 2 cells interrupted; the same command resumes them" in text
+    assert "Traceback" not in text + "".join(capfd.readouterr())
+    gate.open()
+    assert sweep(cells()[:2], out)[0] == 0
 
 
 def test_failures_are_recorded_as_elsewhere(cluster: Any, tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import os
 import random
 import signal
@@ -13,6 +15,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from injected_faults import content
 
 from codesign_bench import load_results
 from codesign_bench.storage.layout import CHECKPOINT_FILE
@@ -27,6 +30,7 @@ ARGUMENTS = ("run", "--method", "toy_search", "--task", "toy_reach", "--set", "e
 SLOW = ("delay=0.01",)
 """Batches that last, so that a kill lands in the middle of one."""
 PATIENCE_SECONDS = 120.0
+KILLING_SECONDS = 600.0
 SEED_FOLDER = Path("toy_reach/toy_search/default/seed-00")
 
 
@@ -117,6 +121,36 @@ def test_two_kills_lose_nothing(tmp_path: Path, gate: Gate) -> None:
 @pytest.mark.slow
 def test_twenty_kills_lose_nothing(tmp_path: Path, gate: Gate) -> None:
     compare_killed_with_undisturbed(tmp_path, 20, (*ARGUMENTS, *SLOW, "--seeds", "2"), gate, steps=12_000)
+
+
+@pytest.mark.slow
+def test_ten_minutes_of_random_kills_lose_nothing(tmp_path: Path) -> None:
+    moments, kills, arguments = random.Random(2), 0, (*ARGUMENTS, *SLOW, "--seeds", "2", "--retry-failed")
+    ends_at = time.monotonic() + KILLING_SECONDS
+    wanted = finished(tmp_path / "undisturbed", arguments)
+    for turn in itertools.count():
+        out = tmp_path / str(turn)
+        while (process := start(*arguments, "--steps", str(STEPS), "--out", out)).poll() is None:
+            time.sleep(moments.uniform(0.0, 6.0))
+            running = [folder for folder in cell_folders(out) if is_locked(folder)]
+            victims = [process.pid, *(record.pid for folder in running if (record := CellRecord.read(folder)))]
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(moments.choice([victim for victim in victims if victim]), signal.SIGKILL)
+                kills += 1
+            if finish(process)[0] == 0:
+                break
+            wait_for(lambda: not any(map(is_locked, cell_folders(out))))  # noqa: B023  # used in this turn
+        assert finished(out, arguments) == wanted
+        if time.monotonic() > ends_at:
+            break
+    assert kills > 20
+
+
+def finished(out: Path, arguments: tuple[str, ...]) -> dict[str, bytes]:
+    """Run a sweep to its end; return what all undisturbed sweeps have in common."""
+    code, text = finish(start(*arguments, "--steps", str(STEPS), "--out", out))
+    assert code == 0, text
+    return content(out)
 
 
 def test_wall_time_goes_on_from_the_interruption(tmp_path: Path, gate: Gate) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from injected_faults import campaign, start_together
 
 pytestmark = pytest.mark.usefixtures("toy", "every_batch")

@@ -15,12 +15,12 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from injected_faults import content
 
 from codesign_bench import load_results
 from codesign_bench.storage.layout import CHECKPOINT_FILE
 from codesign_bench.storage.locks import is_locked
 from codesign_bench.storage.records import CellRecord
+from injected_faults import content
 from toy import Gate
 
 pytestmark = pytest.mark.usefixtures("toy", "every_batch")

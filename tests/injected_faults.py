@@ -199,7 +199,7 @@ def run(out: Path, fault: Fault, cells: tuple[Cell, ...] = CELLS) -> Ended:
                 tally(injection)
             return code
 
-        return in_child(call, Path(os.devnull))
+        return in_child(call, folder / workers.LOG_FILE)
 
     def sweep() -> int:
         injection = Injection(out, fault if fault.where == MAIN else Fault(MAIN))

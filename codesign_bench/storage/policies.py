@@ -5,12 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from codesign_bench.config.resolve import method_config
 from codesign_bench.errors import ChangedTaskError, UserError
 from codesign_bench.method import Array, Policy, load_method
+from codesign_bench.storage.arrays import load_arrays, save_arrays
 from codesign_bench.storage.cells import StoredCell, open_cell
-from codesign_bench.storage.checkpoint import load_arrays, save_arrays
+from codesign_bench.storage.files import reason_of
 from codesign_bench.storage.layout import POLICY_FILE
+from codesign_bench.storage.reading import DamagedFile, UnreadableFile
 from codesign_bench.task import Task, load_task
 
 
@@ -44,8 +48,9 @@ def policy_of(cell: StoredCell) -> Policy:
     except ChangedTaskError as error:
         again = f"codesign-bench run --task {record.task} --method {record.method}"
         raise ChangedTaskError(f"{path} was {error}; train it again, into another folder: {again}") from error
-    except (KeyError, ValueError, RuntimeError) as error:
-        raise UserError(f"{path} is incompatible with method '{record.method}' of this version: {error}") from error
+    except (KeyError, ValueError, TypeError, IndexError, AttributeError, RuntimeError, MemoryError) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise UserError(f"{path} is incompatible with method '{record.method}' of this version: {reason}") from error
 
 
 def misfit(cell: StoredCell) -> str:
@@ -89,9 +94,15 @@ def policy_tensors(cell: StoredCell) -> dict[str, Array]:
         )
     path = cell.folder / POLICY_FILE
     try:
-        return load_arrays(path)[0]
+        tensors = load_arrays(path)[0]
     except FileNotFoundError:
         state = "its policy file is missing" if cell.is_done else f"its status is '{cell.status}'"
         raise UserError(f"'{cell.folder}' has no final policy: {state}") from None
     except ValueError as error:
-        raise UserError(f"cannot load {path}: {error}") from error
+        raise DamagedFile(path, str(error)) from error
+    except OSError as error:
+        raise UnreadableFile(path, reason_of(error)) from error
+    for name, tensor in tensors.items():
+        if (np.isnan(tensor) | np.isposinf(tensor)).any():  # the logarithm of a standard deviation of 0 is -inf
+            raise DamagedFile(path, f"'{name}' has values that are not numbers")
+    return tensors

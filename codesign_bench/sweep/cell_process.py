@@ -24,6 +24,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.machine import host_facts, package_versions
 from codesign_bench.plugins import import_modules
 from codesign_bench.processes import EXIT_ORPHANED
+from codesign_bench.storage.cells import table_checksums
 from codesign_bench.storage.checkpoint import remove_checkpoint
 from codesign_bench.storage.files import remove_partial_files
 from codesign_bench.storage.layout import CHECKPOINT_FILE, LOCK_FILE, LOG_FILE, PROGRESS_FILE, cell_lock
@@ -119,7 +120,8 @@ def _run_and_record(resolved: ResolvedCell, folder: Path, record: CellRecord) ->
         reached = {} if run is None else {"env_steps": run.progress.env_steps, "timings": run.timings()}
         record.ended(FAILED, failure=Failure(message, traceback.format_exc()), **reached).write(folder)
         return EXIT_FAILED
-    record.ended(DONE, env_steps=run.progress.env_steps, timings=run.timings()).write(folder)
+    reached = {"env_steps": run.progress.env_steps, "timings": run.timings()}
+    record.ended(DONE, checksums=table_checksums(folder), **reached).write(folder)
     remove_checkpoint(folder / CHECKPOINT_FILE)
     for name in (PROGRESS_FILE, LOG_FILE, LOCK_FILE):
         (folder / name).unlink(missing_ok=True)

@@ -16,8 +16,10 @@ from codesign_bench.console import Log, printer
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores
 from codesign_bench.registry import IMPORTS_VARIABLE
+from codesign_bench.storage.cells import StoredCell, stored_record
 from codesign_bench.storage.checkpoint import check_checkpoint
 from codesign_bench.storage.layout import CHECKPOINT_FILE, CURVE_FILE, is_locked, open_folder
+from codesign_bench.storage.reading import DamagedFile
 from codesign_bench.storage.records import DONE, FAILED, CellRecord
 from codesign_bench.sweep.backends import Backend, WorkersDied, make_backend
 from codesign_bench.sweep.progress import ProgressDisplay
@@ -46,13 +48,15 @@ def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = 
         UserError: a stored cell has another configuration, or a cell file or checkpoint is damaged.
     """
     plan = Plan([], {}, [])
-    records = {resolved.cell: CellRecord.read(resolved.cell.folder(out)) for resolved in cells}
+    records = {resolved.cell: stored_record(resolved.cell, out) for resolved in cells}
     _refuse_other_configurations(cells, records, out)
     _refuse_without_pretrained([resolved.cell for resolved in cells], out)
     for resolved in cells:
         cell = resolved.cell
         record = records[cell]
-        if record is not None and record.status == DONE:
+        if record is not None and record.status == DONE and (problems := _problems(cell, record, out)):
+            plan.failed[cell] = f"is done, but cannot be used: {problems}"
+        elif record is not None and record.status == DONE:
             plan.done.append(cell)
         elif record is not None and record.failure is not None and not retry_failed:
             plan.failed[cell] = record.failure.message
@@ -60,6 +64,15 @@ def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = 
             check_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is reported here, not during the sweep
             plan.pending.append(resolved)
     return plan
+
+
+def _problems(cell: Cell, record: CellRecord, out: Path) -> str:
+    """Return which files of a finished cell cannot be used, and why; "" if all can."""
+    problems = StoredCell(cell.folder(out), record).problems
+    told = [f"{problem.path.name}: {problem.reason}" for problem in problems]
+    if problems and all(isinstance(problem, DamagedFile) for problem in problems):
+        told.append("delete its folder to run it again")
+    return "; ".join(told)
 
 
 def split_cores(cores: int, cells: int, threads: int, jobs: int | None) -> tuple[int, str]:

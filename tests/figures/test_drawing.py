@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from builders import rising, store_cell
 from codesign_bench import registry
 from codesign_bench.errors import UserError
-from codesign_bench.figures.drawing import draw_figures, figure_names, make_folder, possible_drawings, save
+from codesign_bench.figures.drawing import draw_figures, figure_names, possible_drawings, save
 from codesign_bench.figures.source import Request
 from codesign_bench.registry import names
 from codesign_bench.study import Study
@@ -148,11 +148,3 @@ def test_saving_returns_the_paths_with_the_picture_last(add_figure: AddFigure, r
     study = Study(name="small", title="Small", question="Is it so?")
     (drawing,) = [found for found in possible_drawings(results, print, study) if found.name == "mine"]
     assert [path.suffix for path in save(drawing, tmp_path)] == [".md", ".csv", ".pdf", ".png"]
-
-
-def test_a_folder_is_made_and_left_empty_or_refused(tmp_path: Path) -> None:
-    make_folder(tmp_path / "new" / "figures")
-    assert list((tmp_path / "new" / "figures").iterdir()) == []
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="file/figures: not writable"):
-        make_folder(tmp_path / "file" / "figures")

@@ -18,6 +18,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import table_checksums
 from codesign_bench.storage.layout import CURVE_COLUMNS, CURVE_FILE, EVALUATION_FILE, write_rows
 from codesign_bench.storage.records import DONE, CellRecord
+from codesign_bench.storage.tables import Content, Measurements
 from codesign_bench.sweep.runner import run_sweep
 
 Part = TypeVar("Part")
@@ -78,6 +79,15 @@ def store_cell(
     record |= {"checksums": table_checksums(folder)} if finished else {}
     CellRecord(task=task, method=method, seed=seed, variant=variant, status=status, **record).write(folder)
     return folder
+
+
+def store_table(path: Path, kind: Measurements, *rows: Mapping[str, Any]) -> Path:
+    """Write a table beside the cells with the columns that matter, and return its path; others hold 1 or a word."""
+    columns = {name: content for name, content in kind.form.columns.items() if "*" not in name}
+    others = {name: "word" if content is Content.TEXT else 1 for name, content in columns.items()}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_rows(path, [{**others, **row} for row in rows])
+    return path
 
 
 def rising(*returns: float, every: int = 100) -> list[dict[str, Any]]:

@@ -256,6 +256,9 @@ def of_a_cell_file() -> Iterator[tuple[str, Change, bool]]:
         yield f"its budget is {name}", _set("config", "run", "steps", "value", value=value), True
         yield f"a version is {name}", _set("versions", "python", value=value), name not in ("null", "a text")
         yield f"its processor is {name}", _set("host", "cpu", value=value), name not in ("null", "a text")
+    widths = {"wide": [10**9, 10**9], "deep": [64] * 100_000, "of texts": ["64"], "of nothing": [], "negative": [-64]}
+    for name, value in widths.items():
+        yield f"networks {name}", _set("config", "method", "control_gnn", value={"value": value, "source": "x"}), False
     yield "a newer schema", _set("schema", value=99), True
     yield "an unknown status", _set("status", value="sleeping"), True
     yield "another seed", _set("seed", value=7), True
@@ -389,38 +392,24 @@ TABLES: Mapping[str, str] = {
 
 def make_results(out: Path) -> None:
     """Make the folder: three finished toy cells, one of an earlier version with a policy, and a table of each kind."""
-    import numpy as np
-
-    from builders import VERSION_0_1_0, sweep, toy_cells
+    from builders import VERSION_0_1_0, store_table, sweep, toy_cells
     from codesign_bench.storage.measurements import ALL
-    from codesign_bench.storage.tables import Content
 
     sweep(toy_cells(3), out)
     shutil.copytree(VERSION_0_1_0 / CELL, out / "one" / CELL)
-    rng = np.random.default_rng(0)
-    for (path, _), kind in zip(TABLES.items(), ALL, strict=True):
-        columns = [name for name in kind.form.columns if "*" not in name]
-        rows = []
-        for number in range(8):
-            row: dict[str, Any] = {}
-            for name in columns:
-                content = kind.form.columns[name]
-                row[name] = {Content.TEXT: "text", Content.WHOLE: 1, Content.SHARE: 1}.get(content, float(rng.normal()))
-            row |= {"task": "toy_reach"} if "task" in columns else {}
-            last = kind.form.unique[-1]
-            row[last] = f"point {number}" if last == "point" else number
-            rows.append(row)
-        (out / path).parent.mkdir(parents=True, exist_ok=True)
-        text = [",".join(columns), *(",".join(str(row[name]) for name in columns) for row in rows)]
-        (out / path).write_text("\n".join(text) + "\n")
+    for path, kind in zip(TABLES, ALL, strict=True):
+        last = kind.form.unique[-1]
+        rows = [{"task": "toy_reach", last: f"{last} {n}" if last == "point" else n} for n in range(8)]
+        store_table(out / path, kind, *rows)
 
 
 def damages() -> Iterator[tuple[Damage, tuple[str, ...]]]:
     """Yield every damage with the commands that run on it."""
     on_cells = (*FOLDER_COMMANDS, RUN)
     for name, change, told in of_a_cell_file():
+        moved = name.startswith("another ")  # the folder of one cell may be anywhere
         yield Damage(f"{SEED}/cell.json", name, change, told), on_cells
-        yield Damage(f"one/{CELL}/cell.json", name, change, told), CELL_COMMANDS
+        yield Damage(f"one/{CELL}/cell.json", name, change, told and not moved), CELL_COMMANDS
     for file, column in (("curve.csv", "return_mean"), ("evaluation.csv", "return")):
         for name, change in {**OF_ANY_FILE, **of_a_table(column), "missing": Path.unlink}.items():
             yield Damage(f"{SEED}/{file}", name, change), on_cells

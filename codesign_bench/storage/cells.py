@@ -54,6 +54,8 @@ EVALUATION_FORM = Form(
         "in_cutout*": Content.SHARE,
     }
 )
+SUMMARIES = {"return": "return_mean", "success": "success_rate", "episode_length": "episode_length"}
+"""Column of an evaluation -> column of the curve with its mean."""
 SAME = 1e-6
 """Relative difference below which two means are the same, however they were summed."""
 
@@ -137,11 +139,12 @@ class StoredCell:
 
     def _compare_with_curve(self, evaluation: pd.DataFrame) -> None:
         """Check a cell without checksums: the last row of its curve is the mean of the evaluation's rows."""
-        last = self.last_evaluation().get("return_mean")
-        found = float(evaluation["return"].mean())
-        if last is not None and abs(found - last) > SAME * max(abs(last), 1.0):
-            reason = f"its mean return is {found:.6g}, that of the last row of {CURVE_FILE} {last:.6g}"
-            raise DamagedFile(self.folder / EVALUATION_FILE, reason)
+        ends = self.last_evaluation()
+        for name, end in SUMMARIES.items():
+            mean, last = float(evaluation[name].mean()), ends.get(end)
+            if last is not None and abs(mean - last) > SAME * max(abs(last), 1.0):
+                reason = f"its mean {name} is {mean:.6g}, that of the last row of {CURVE_FILE} {last:.6g}"
+                raise DamagedFile(self.folder / EVALUATION_FILE, reason)
 
     def _check_policy(self) -> None:
         from codesign_bench.storage.arrays import check_arrays  # needs safetensors, which `--help` need not

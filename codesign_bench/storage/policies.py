@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,11 @@ from codesign_bench.storage.cells import StoredCell, open_cell
 from codesign_bench.storage.files import reason_of
 from codesign_bench.storage.layout import POLICY_FILE
 from codesign_bench.storage.reading import DamagedFile, UnreadableFile
+from codesign_bench.storage.records import CELL_FILE
 from codesign_bench.task import Task, load_task
+
+MOST_LAYERS, WIDEST, LARGEST_LAYER = 64, 2**16, 2**26
+"""Limits of the networks in a cell file: number of layers, width of a layer, weights between two."""
 
 
 def save_policy(folder: Path, policy: Policy, header: dict[str, Any]) -> None:
@@ -42,6 +47,7 @@ def policy_of(cell: StoredCell) -> Policy:
     """
     tensors, record, path = policy_tensors(cell), cell.record, cell.folder / POLICY_FILE
     method_class = load_method(record.method)
+    _check_widths(cell)
     config = method_config(method_class.config_class, record.config.method)
     try:
         return method_class.make_policy(load_task(record.task), config, tensors)
@@ -77,6 +83,19 @@ def policy_and_task(folder: Path, name: str | None) -> tuple[Policy, Task]:
     if name not in (None, trained_on):
         raise UserError(f"--policy {folder}: trained on '{trained_on}', not on '{name}'")
     return policy_of(cell), load_task(trained_on)
+
+
+def _check_widths(cell: StoredCell) -> None:
+    """Check that a cell's settings ask for no network that could not be in a policy's file, before it is allocated.
+
+    Raises:
+        DamagedFile: a list of widths is too long, or its layers are too large.
+    """
+    for name, (value, _) in cell.record.config.method.items():
+        widths = value if isinstance(value, list) and all(type(width) is int for width in value) else []
+        layers = [before * after for before, after in pairwise(widths)]
+        if len(widths) > MOST_LAYERS or max([*widths, 0]) > WIDEST or max([*layers, 0]) > LARGEST_LAYER:
+            raise DamagedFile(cell.folder / CELL_FILE, f"'{name}' asks for a network that no policy has")
 
 
 def policy_tensors(cell: StoredCell) -> dict[str, Array]:

@@ -20,8 +20,8 @@ from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.seeding import generator
-from codesign_bench.storage.cells import is_there
 from codesign_bench.storage.measurements import DESIGN_SENSITIVITY, usable
+from codesign_bench.storage.reading import is_there
 from codesign_bench.storage.tables import write_table
 from codesign_bench.task import EVALUATION_SEED, Floats, Task, load_task, task_names
 from codesign_bench.task.behaviours import GivenDesigns

@@ -24,7 +24,7 @@ from codesign_bench.storage.layout import (
     POLICY_FILE,
     is_locked,
 )
-from codesign_bench.storage.reading import DamagedFile, UnreadableFile, UnusableFile, read_bytes
+from codesign_bench.storage.reading import DamagedFile, UnreadableFile, UnusableFile, is_folder, is_there, read_bytes
 from codesign_bench.storage.records import CELL_FILE, DONE, INTERRUPTED, RUNNING, CellRecord
 from codesign_bench.storage.tables import TABLE_BYTES, Content, Form, checksum, read_table
 
@@ -92,12 +92,12 @@ class StoredCell:
         return is_there(self.folder / POLICY_FILE)
 
     def curve(self) -> pd.DataFrame | None:
-        """Return its curve, or None if it was not evaluated yet.
+        """Return its curve, or None if it was not evaluated yet; do not change the table, which is read once.
 
         Raises:
             UnusableFile: it is damaged or cannot be read, or the cell is done and has none.
         """
-        return self._table(CURVE_FILE, CURVE_FORM)
+        return self._curve
 
     def evaluation(self) -> pd.DataFrame | None:
         """Return its last evaluation, one row per instance, or None if the cell is not done yet.
@@ -112,6 +112,14 @@ class StoredCell:
 
     def last_evaluation(self) -> dict[str, float]:
         """Return the last row of its curve, or an empty dictionary if there is none that can be read."""
+        return self._last_evaluation
+
+    @cached_property
+    def _curve(self) -> pd.DataFrame | None:
+        return self._table(CURVE_FILE, CURVE_FORM)
+
+    @cached_property
+    def _last_evaluation(self) -> dict[str, float]:
         try:
             curve = self.curve()
         except UnusableFile:
@@ -228,29 +236,6 @@ def reported_cells(out: Path) -> Iterator[StoredCell]:
         UserError: the folder does not exist.
     """
     return (cell for cell in find_cells(out) if cell.is_reported)
-
-
-def is_there(path: Path) -> bool:
-    """Return whether there is anything at `path`, also what cannot be read."""
-    try:
-        path.lstat()
-    except (FileNotFoundError, NotADirectoryError):
-        return False
-    except OSError:
-        return True
-    return True
-
-
-def is_folder(path: Path) -> bool:
-    """Return whether `path` is a folder.
-
-    Raises:
-        UnreadableFile: the system did not let us look.
-    """
-    try:
-        return path.is_dir()
-    except (OSError, ValueError) as error:
-        raise UnreadableFile(path, reason_of(error) if isinstance(error, OSError) else str(error)) from error
 
 
 def _at_depth(folder: Path, depth: int, unusable: list[UnusableFile]) -> Iterator[Path]:

@@ -71,11 +71,10 @@ def load_evaluations(out: str | Path) -> pd.DataFrame:
     import pandas as pd
 
     parts = _tables_of((cell for cell in reported_cells(Path(out)) if cell.is_done), StoredCell.evaluation)
-    for _, table in parts:
-        table.insert(0, "instance", range(len(table)))
     if not parts:
         raise UserError(f"no finished cell in '{out}' yet; create some with: codesign-bench run --out {out}")
-    return pd.concat(_with_cell_columns(parts), ignore_index=True).astype({"seed": int})
+    numbered = [(cell, _in_front({"instance": range(len(table))}, table)) for cell, table in parts]
+    return pd.concat(_with_cell_columns(numbered), ignore_index=True).astype({"seed": int})
 
 
 def default_rows(frame: pd.DataFrame) -> pd.DataFrame:
@@ -128,7 +127,7 @@ def _with_cell_columns(parts: Sequence[tuple[StoredCell, pd.DataFrame]]) -> list
     return result
 
 
-def _in_front(columns: Mapping[str, Value], table: pd.DataFrame) -> pd.DataFrame:
+def _in_front(columns: Mapping[str, Value | range], table: pd.DataFrame) -> pd.DataFrame:
     """Return a table with further columns in front, which replace columns of the same names."""
     kept = table.drop(columns=[name for name in columns if name in table.columns])
     return kept.assign(**columns)[[*columns, *kept.columns]]

@@ -43,6 +43,29 @@ class UnreadableFile(UnusableFile):
     """The system did not let us read a file, so nothing is known about its content."""
 
 
+def is_there(path: Path) -> bool:
+    """Return whether there is anything at `path`, also what cannot be read."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def is_folder(path: Path) -> bool:
+    """Return whether `path` is a folder.
+
+    Raises:
+        UnreadableFile: the system did not let us look.
+    """
+    try:
+        return path.is_dir()
+    except (OSError, ValueError) as error:
+        raise UnreadableFile(path, reason_of(error) if isinstance(error, OSError) else str(error)) from error
+
+
 def open_regular(path: Path, limit: int) -> int:
     """Return a descriptor of the regular file `path` of at most `limit` bytes; nothing is waited for.
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from codesign_bench.errors import UserError
-from codesign_bench.storage.cells import Contents, is_there, scan
+from codesign_bench.storage.cells import Contents, scan
 from codesign_bench.storage.measurements import ALL, paths_of
-from codesign_bench.storage.reading import DamagedFile, UnusableFile
+from codesign_bench.storage.reading import DamagedFile, UnusableFile, is_there
 from codesign_bench.storage.tables import Measurements, read_table
 
 

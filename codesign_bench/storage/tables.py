@@ -15,7 +15,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from codesign_bench.storage.files import Outputs, encoded
 from codesign_bench.storage.json_fields import LARGEST_WHOLE, MOST_CHARACTERS
@@ -25,11 +28,15 @@ from codesign_bench.storage.reading import MEGABYTE, DamagedFile, read_bytes
 if TYPE_CHECKING:
     import pandas as pd
 
+Booleans: TypeAlias = NDArray[np.bool_]
+
 TABLE_BYTES = 16 * MEGABYTE
 """Largest table; the largest that we write has hundreds of kilobytes."""
 MOST_COLUMNS = 4096
 LARGEST = 1e15
 """Largest size of a number: what is measured is far smaller, and figures can still be drawn."""
+NUMBERS = "biuf"
+"""Kinds of numpy's types: truth values, integers with and without sign, floats."""
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
@@ -185,20 +192,34 @@ def _check_column(column: pd.Series[float], kind: Content) -> None:
     Raises:
         ValueError: names the column and the first row that is otherwise; rows count from 1.
     """
-    for row, value in enumerate(column.tolist(), start=1):
-        if not _fits(value, kind):
-            told = "nothing" if value != value else f"'{str(value)[:40]}'"
-            raise ValueError(f"row {row} has {told} in the column '{column.name}', which holds {kind.value}")
+    fits = _texts(column) if kind is Content.TEXT else _numbers(column, kind)
+    if not fits.all():
+        row = int(fits.argmin())
+        value = column.iloc[row]
+        told = "nothing" if value != value else f"'{str(value)[:40]}'"
+        raise ValueError(f"row {row + 1} has {told} in the column '{column.name}', which holds {kind.value}")
 
 
-def _fits(value: object, kind: Content) -> bool:
-    if kind is Content.TEXT:  # a column of digits is read as numbers
-        return value == value and (not isinstance(value, str) or len(value) <= MOST_CHARACTERS)
-    if not isinstance(value, int | float) or not isfinite(value):  # True and False are 1 and 0
-        return False
-    if kind is Content.WHOLE:
-        return value == int(value) and 0 <= value <= LARGEST_WHOLE
-    return 0 <= value <= 1 if kind is Content.SHARE else abs(value) <= LARGEST
+def _texts(column: pd.Series[float]) -> Booleans:
+    """Return which values are texts; a column of digits was read as numbers."""
+    if column.dtype.kind in NUMBERS:
+        return np.asarray(column.notna())
+    return np.array([isinstance(value, str) and len(value) <= MOST_CHARACTERS for value in column])
+
+
+def _numbers(column: pd.Series[float], kind: Content) -> Booleans:
+    """Return which values are numbers of a kind; True and False are 1 and 0."""
+    if column.dtype.kind not in NUMBERS:  # at least one is none
+        return np.array(
+            [isinstance(value, int | float) and isfinite(value) and abs(value) < LARGEST for value in column]
+        )
+    values = column.to_numpy(dtype=np.float64)
+    with np.errstate(invalid="ignore"):
+        if kind is Content.WHOLE:
+            fits = (values == np.floor(values)) & (values >= 0) & (values <= LARGEST_WHOLE)
+        else:
+            fits = (values >= 0) & (values <= 1) if kind is Content.SHARE else np.abs(values) <= LARGEST
+    return np.asarray(fits & np.isfinite(values))
 
 
 def _check_rows(table: pd.DataFrame, form: Form) -> None:

@@ -148,3 +148,25 @@ def test_saving_returns_the_paths_with_the_picture_last(add_figure: AddFigure, r
     study = Study(name="small", title="Small", question="Is it so?")
     (drawing,) = [found for found in possible_drawings(results, print, study) if found.name == "mine"]
     assert [path.suffix for path in save(drawing, tmp_path)] == [".md", ".csv", ".pdf", ".png"]
+
+
+@pytest.mark.parametrize("label", [r"$\frac{1$", r"$\nonsense$", "costs $5 or $6", "x" * 10_000, "\x1b[2J\x00"])
+def test_text_of_results_is_never_a_formula(tmp_path: Path, label: str) -> None:
+    store_cell(tmp_path / "runs", curve=rising(1.0, 2.0), label=label[:500])
+    draw_figures(["learning_curves", "final_results"], tmp_path / "runs", tmp_path / "out", print)
+    assert (tmp_path / "out" / "learning_curves.png").stat().st_size > 0
+
+
+def test_a_figure_that_cannot_be_written_leaves_the_earlier_one_whole(
+    add_figure: AddFigure, results: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    add_figure("mine")
+    draw_figures(["mine"], results, out, print)
+    before = {path.name: path.read_bytes() for path in out.iterdir() if path.suffix != ".pdf"}
+    (out / "mine.pdf").unlink()
+    (out / "mine.pdf").mkdir()
+    add_figure("mine", data=lambda frame: frame.assign(y=3 * frame["x"]))
+    with pytest.raises(UserError, match=r"--out .*: mine\.pdf is not writable \(it is a folder\)"):
+        draw_figures(["mine"], results, out, print)
+    assert {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()} == before

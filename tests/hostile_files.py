@@ -3,7 +3,7 @@
 For each damage a results folder is made, one file of it damaged, and one command run. The command must end in time and
 within its memory, without a traceback, and name the damaged file if it would read it. From the root of the repository:
 
-    .venv/bin/python tests/hostile_files.py              every combination, in half an hour on two cores
+    .venv/bin/python tests/hostile_files.py              every combination, in some hours
     .venv/bin/python tests/hostile_files.py --every 20   every twentieth
     .venv/bin/python tests/hostile_files.py --only curve.csv status
 
@@ -26,6 +26,7 @@ import tempfile
 import time
 import traceback
 import warnings
+import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -45,7 +46,9 @@ CELL = "fetch_cube/gnn_ppo/default/seed-00"
 
 FOLDER_COMMANDS = ("status", "plot", "verify", "report", "load_results")
 CELL_COMMANDS = ("render", "export", "deploy", "load_policy")
-RUN = "run"
+RUN, RESUME, TUNED = "run", "resume", "tuned"
+INTERRUPTED = "toy_reach/toy_search/default/seed-03"
+LARGE = "checkpoint.large-1.npz"
 
 Change = Callable[[Path], None]
 
@@ -287,6 +290,16 @@ def of_a_cell_file() -> Iterator[tuple[str, Change, bool]]:
         yield f"a label with {name}", _set("label", value=label), False
 
 
+OF_SETTINGS: Mapping[str, Change] = {
+    "no winners": _json(lambda values: {}),
+    "winners that are a number": _json(lambda values: {"winners": 7}),
+    "a winner that is a text": _json(lambda values: {"winners": ["x"]}),
+    "a task that is a list": _json(lambda values: {"winners": [{**values["winners"][0], "task": []}]}),
+    "settings that are numbers": _json(lambda values: {"winners": [{**values["winners"][0], "set": [1, 2]}]}),
+    "settings that are null": _json(lambda values: {"winners": [{**values["winners"][0], "set": None}]}),
+    "a key twice": _json(lambda values: '{"winners": [], "winners": []}'),
+    "nested deeply": _json(lambda values: '{"winners": ' + "[" * 100_000 + "]" * 100_000 + "}"),
+}
 LABELS = {
     "control sequences": "\x1b]0;owned\x07\x1b[2J\x9b31m",
     "a formula": r"$\frac{1}{0$ and $\nonsense$",
@@ -377,6 +390,33 @@ def of_a_policy() -> dict[str, Change]:
     }
 
 
+def _compressed(path: Path) -> None:
+    """Put half a gigabyte of zeros into an archive of half a megabyte."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("buffer.npy", "w") as member:
+        for _ in range(512):
+            member.write(bytes(2**20))
+    _take_checksums(path)
+
+
+def _take_checksums(path: Path) -> None:
+    """Give the checkpoint the checksums of its large file, as the author of a hostile one would."""
+    from codesign_bench.storage.arrays import load_arrays, save_arrays
+
+    with zipfile.ZipFile(path) as archive:
+        checksums = {info.filename.removesuffix(".npy"): info.CRC for info in archive.infolist()}
+    arrays, header = load_arrays(path.with_name("checkpoint.safetensors"))
+    header["large"]["checksums"] = checksums
+    save_arrays(path.with_name("checkpoint.safetensors"), arrays, header)
+
+
+AROUND = ("zeros at its end", "bytes that are no text", "a line of two megabytes", "a quote that never ends")
+"""What stands before or after the content; an archive and its checksums are the same with it."""
+OF_LARGE_ARRAYS: Mapping[str, Change] = {
+    "a bomb": _compressed,
+    "missing": Path.unlink,
+}
+
+
 # The folder.
 
 TABLES: Mapping[str, str] = {
@@ -396,6 +436,8 @@ def make_results(out: Path) -> None:
     from codesign_bench.storage.measurements import ALL
 
     sweep(toy_cells(3), out)
+    _interrupt(out / SEED, out / INTERRUPTED)
+    (out / "tuned.json").write_text(json.dumps({"winners": [WINNER]}))
     shutil.copytree(VERSION_0_1_0 / CELL, out / "one" / CELL)
     for path, kind in zip(TABLES, ALL, strict=True):
         last = kind.form.unique[-1]
@@ -403,11 +445,32 @@ def make_results(out: Path) -> None:
         store_table(out / path, kind, *rows)
 
 
+WINNER = {"task": "toy_reach", "method": "toy_search", "set": ["step_size=0.3"]}
+
+
+def _interrupt(done: Path, folder: Path) -> None:
+    """Make a cell that was interrupted in the middle, with a checkpoint and large arrays."""
+    import numpy as np
+
+    from codesign_bench.method import State
+    from codesign_bench.storage.checkpoint import Checkpoint, Progress, save_checkpoint
+
+    shutil.copytree(done, folder)
+    for name in ("curve.csv", "evaluation.csv", "policy.safetensors"):
+        (folder / name).unlink()
+    values = json.loads((folder / "cell.json").read_text())
+    values |= {"status": "running", "seed": 3, "checksums": {}}
+    (folder / "cell.json").write_text(json.dumps(values))
+    state = State({"best": np.zeros(2)}, {"best_return": 0.0, "env_steps": 100}, {"buffer": np.arange(1000.0)})
+    save_checkpoint(folder / "checkpoint.safetensors", Checkpoint(state, {}, Progress(env_steps=100)))
+
+
 def damages() -> Iterator[tuple[Damage, tuple[str, ...]]]:
     """Yield every damage with the commands that run on it."""
     on_cells = (*FOLDER_COMMANDS, RUN)
     for name, change, told in of_a_cell_file():
-        moved = name.startswith("another ")  # the folder of one cell may be anywhere
+        # The folder of one cell may be anywhere, and cells of version 0.1.0 have no such entry.
+        moved = name.startswith(("another ", "'axes'"))
         yield Damage(f"{SEED}/cell.json", name, change, told), on_cells
         yield Damage(f"one/{CELL}/cell.json", name, change, told and not moved), CELL_COMMANDS
     for file, column in (("curve.csv", "return_mean"), ("evaluation.csv", "return")):
@@ -427,6 +490,15 @@ def damages() -> Iterator[tuple[Damage, tuple[str, ...]]]:
             harmless = name == "a row less" and path in ("reference_points.csv",)
             yield Damage(path, name, change, told=not harmless), FOLDER_COMMANDS
     yield Damage(f"{SEED}/cell.json", "missing", Path.unlink), FOLDER_COMMANDS
+    structural = {
+        name: change for name, change in of_a_policy().items() if "arrays" not in name and "numbers" not in name
+    }
+    for name, change in {**OF_ANY_FILE, **structural}.items():
+        yield Damage(f"{INTERRUPTED}/checkpoint.safetensors", name, change), (RESUME,)
+    for name, change in {**OF_ANY_FILE, **OF_LARGE_ARRAYS}.items():
+        yield Damage(f"{INTERRUPTED}/{LARGE}", name, change, told=name not in AROUND), (RESUME,)
+    for name, change in {**OF_ANY_FILE, **OF_SETTINGS}.items():
+        yield Damage("tuned.json", name, change), (TUNED,)
 
 
 def _beside(change: Change) -> Change:
@@ -466,6 +538,8 @@ def call(command: str, results: Path, out: Path) -> tuple[int, str]:
             *("--set", "evaluations=4", "--out", str(results)),
         ],
     }
+    lines[RESUME] = [word if word != "3" else "3-3" for word in lines[RUN]]
+    lines[TUNED] = [*lines[RUN], "--tuned", str(results / "tuned.json")]
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed), warnings.catch_warnings():
         warnings.simplefilter("always")

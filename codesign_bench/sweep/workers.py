@@ -66,7 +66,8 @@ def run_job(job: Job) -> Outcome:
     folder.mkdir(parents=True, exist_ok=True)
     if is_locked(folder):
         return Outcome(job.cell, BUSY)
-    (folder / PROGRESS_FILE).unlink(missing_ok=True)
+    for name in (PROGRESS_FILE, LOG_FILE):  # opening a pipe in their place would wait for a reader
+        (folder / name).unlink(missing_ok=True)
     code = _run_process(job, folder)
     if code == cell_process.EXIT_DONE:
         return Outcome(job.cell, DONE)

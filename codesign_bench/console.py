@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from typing import TypeAlias
 
 from rich.console import Console
 from rich.table import Table
+
+from codesign_bench.visible_text import on_one_line, visible
 
 Log: TypeAlias = Callable[[str], None]
 """A function that shows the user one line."""
 
 
 def printer(console: Console) -> Log:
-    """Return a function that prints a line verbatim: no markup, no colours, no truncation."""
+    """Return a function that prints a line verbatim: no markup, no colours, no truncation, no control sequences."""
 
     def log(line: str) -> None:
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        console.print(visible(line), markup=False, highlight=False, soft_wrap=True)
 
     return log
+
+
+def tell_left_out(lines: Iterable[str]) -> None:
+    """Print on standard error what a command leaves out because it cannot be used."""
+    for line in lines:
+        with suppress(OSError, ValueError):  # the stream is closed or full
+            print(f"left out: {on_one_line(line)}", file=sys.stderr)
 
 
 def silent(line: str) -> None:
@@ -39,6 +50,7 @@ def duration(seconds: float) -> str:
 
 def print_table(console: Console, headings: Sequence[str], table_rows: Sequence[Sequence[str]]) -> None:
     """Print a table: with borders on a terminal, as aligned lines without truncation elsewhere."""
+    table_rows = [[on_one_line(text) for text in row] for row in table_rows]
     if console.is_terminal:
         table = Table()
         for heading in headings:

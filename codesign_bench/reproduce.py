@@ -10,11 +10,12 @@ from rich.console import Console
 
 from codesign_bench.cell.cell import resolve_cells
 from codesign_bench.claims.verify import verify
-from codesign_bench.console import Log, printer
+from codesign_bench.console import Log, printer, tell_left_out
 from codesign_bench.errors import UserError
 from codesign_bench.figures.drawing import draw_figures
 from codesign_bench.registry import names
 from codesign_bench.report.page import write_report
+from codesign_bench.storage.survey import lines, survey
 from codesign_bench.study.experiment import stages_of
 from codesign_bench.study.study import Study
 from codesign_bench.sweep.runner import EXIT_ALL_DONE, run_sweep
@@ -48,13 +49,15 @@ def reproduce(
     for name, experiment in experiments.items():
         for measure in experiment.measures:
             _attempt(f"measurement of {name}", partial(measure, results, profile, log), log)
+    left_out = lines(results, survey(results))
+    tell_left_out(left_out)
     known = names("paper_figs")
     shown = [name for experiment in experiments.values() for name in experiment.figures if name in known]
     drawn = [_attempt(name, partial(draw_figures, [name], results, figures, log), log) for name in shown]
     if not any(drawn):
         raise UserError(f"nothing can be drawn of {', '.join(experiments)}")
     plays = any(experiment.plays for experiment in experiments.values())
-    claims = partial(verify, study, results, figures.parent / CLAIMS_FOLDER, console, measure=plays)
+    claims = partial(verify, study, results, figures.parent / CLAIMS_FOLDER, console, measure=plays, left_out=left_out)
     _attempt("claims", claims, log)
     _attempt("report", partial(write_report, results, figures.parent / REPORT_FILE, log, study), log)
     return code

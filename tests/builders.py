@@ -15,8 +15,10 @@ from codesign_bench.cell.grid import grid
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.config.settings import Sourced, StoredConfig
 from codesign_bench.errors import UserError
+from codesign_bench.storage.cells import table_checksums
 from codesign_bench.storage.layout import CURVE_COLUMNS, CURVE_FILE, EVALUATION_FILE, write_rows
 from codesign_bench.storage.records import DONE, CellRecord
+from codesign_bench.storage.tables import Content, Measurements
 from codesign_bench.sweep.runner import run_sweep
 
 Part = TypeVar("Part")
@@ -26,6 +28,10 @@ VERSION_0_1_0 = Path(__file__).parent / "data" / "version_0_1_0"
 
 BUDGET = StoredConfig(run={"steps": Sourced(1000, "default")}, method={"epochs": Sourced(4, "default")})
 """A configuration with one setting in each part."""
+
+
+NOTHING_HAPPENED = {"return": 0.0, "success": 0, "episode_length": 1, "material": 0.0, "effort": 0.0}
+"""A row of an evaluation."""
 
 
 def offered(part: Callable[[], Part]) -> Part:
@@ -57,20 +63,31 @@ def store_cell(
         seed: the cell's.
         variant: the cell's.
         status: of its record.
-        curve: rows of its curve, with the columns that matter; others are 0.
-        evaluation: rows of its last evaluation.
+        curve: rows of its curve, with the columns that matter; others are 0. A finished cell has one row at least.
+        evaluation: rows of its last evaluation, likewise.
         fields: further fields of its record.
     """
     folder = Cell(task, method, seed, variant).folder(out)
     folder.mkdir(parents=True)
-    record = {"label": method, "profile": "quick", "config": BUDGET, **fields}
-    CellRecord(task=task, method=method, seed=seed, variant=variant, status=status, **record).write(folder)
-    if curve:
+    finished = status == DONE
+    if curve := curve or ([{}] if finished else []):
         zeros = dict.fromkeys(CURVE_COLUMNS, 0.0)
         write_rows(folder / CURVE_FILE, [{**zeros, "env_steps": 0, **row} for row in curve], CURVE_COLUMNS)
-    if evaluation:
-        write_rows(folder / EVALUATION_FILE, evaluation)
+    if evaluation := evaluation or ([{"return": curve[-1].get("return_mean", 0.0)}] if finished else []):
+        write_rows(folder / EVALUATION_FILE, [{**NOTHING_HAPPENED, **row} for row in evaluation])
+    record = {"label": method, "profile": "quick", "config": BUDGET, **fields}
+    record |= {"checksums": table_checksums(folder)} if finished else {}
+    CellRecord(task=task, method=method, seed=seed, variant=variant, status=status, **record).write(folder)
     return folder
+
+
+def store_table(path: Path, kind: Measurements, *rows: Mapping[str, Any]) -> Path:
+    """Write a table beside the cells with the columns that matter, and return its path; others hold 1 or a word."""
+    columns = {name: content for name, content in kind.form.columns.items() if "*" not in name}
+    others = {name: "word" if content is Content.TEXT else 1 for name, content in columns.items()}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_rows(path, [{**others, **row} for row in rows])
+    return path
 
 
 def rising(*returns: float, every: int = 100) -> list[dict[str, Any]]:

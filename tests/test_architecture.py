@@ -66,6 +66,7 @@ OF_NO_MODULE = {
     "tests/tasks/test_frozen_scenes.py": "of every task: that its scene is the one of its version",
     "tests/tasks/test_soundness.py": "of every task: that its physics are sound",
     "tests/test_architecture.py": "of the code as a whole",
+    "tests/test_hostile_files.py": "of every command, on results folders with damaged files",
     "tests/test_packaging.py": "of the package as it installs",
     "tests/test_portable.py": "of the settings under which `make test-portable` runs",
     "tests/test_third_party.py": "of the whole program, with members of another package",

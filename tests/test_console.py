@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from codesign_bench.console import duration, number
+import io
+
+import pytest
+from rich.console import Console
+
+from codesign_bench.console import duration, number, print_table, printer, tell_left_out
 
 
 def test_durations_have_the_largest_unit_that_fits() -> None:
@@ -11,3 +16,20 @@ def test_durations_have_the_largest_unit_that_fits() -> None:
 
 def test_numbers_have_two_decimals_and_nothing_stands_for_none() -> None:
     assert [number(1.234), number(None)] == ["1.23", ""]
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_text_of_results_controls_no_terminal(terminal: bool) -> None:
+    stream = io.StringIO()
+    console = Console(file=stream, force_terminal=terminal, no_color=True, width=200)
+    printer(console)("a line \x1b]0;title\x07")
+    print_table(console, ("[bold]cell",), [("\x1b[2J\rgone\nand [red]more",)])
+    for shown in (r"a line \x1b]0;title\x07", r"\x1b[2J\rgone and [red]more", "[bold]cell"):
+        assert shown in stream.getvalue()
+    assert "\x07" not in stream.getvalue()
+    assert "\x1b[2J" not in stream.getvalue()
+
+
+def test_what_is_left_out_is_told_on_standard_error(capsys: pytest.CaptureFixture[str]) -> None:
+    tell_left_out(["a.csv: empty", "b.csv: \x1b"])
+    assert capsys.readouterr() == ("", "left out: a.csv: empty\nleft out: b.csv: \\x1b\n")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from codesign_bench.text_tables import is_number, markdown, read_markdown
+from codesign_bench.text_tables import is_number, latex, markdown, plain_markdown, read_markdown
 
 
 def test_a_markdown_table_is_read_as_it_was_written() -> None:
@@ -22,6 +22,34 @@ def test_a_table_may_have_no_rows() -> None:
 )
 def test_other_texts_are_no_table(text: str) -> None:
     assert read_markdown(text) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("<script>alert(1)</script>", "&lt;script>alert(1)&lt;/script>"),
+        ("<!-- hidden", "&lt;!-- hidden"),
+        ("&lt;b&gt;", "&amp;lt;b&amp;gt;"),
+        ("![x](http://example.com/x)", "![x]\\(http://example.com/x)"),
+        ("two\nlines | \x1b[2J", r"two lines \| \x1b[2J"),
+        ("p < 0.05 & n > 3", "p < 0.05 & n > 3"),
+    ],
+)
+def test_a_cell_of_a_markdown_table_is_never_markup(text: str, shown: str) -> None:
+    assert markdown([text], []) == f"| {shown} |\n| --- |\n"
+
+
+def test_what_stands_for_markup_is_read_as_what_it_was() -> None:
+    rows = [["<b>a</b> & b", "&lt;c&gt;", "[d](e) | f"]]
+    assert read_markdown(markdown(["x", "y", "z"], rows)) == (["x", "y", "z"], rows)
+    assert plain_markdown("words") == "words"
+
+
+def test_a_latex_table_has_no_commands_but_its_own() -> None:
+    table = latex([r"\input{x}"], [["100% & $5_{~^#"], ["two\nlines"]])
+    assert r"\textbackslash{}input\{x\} \\" in table
+    assert r"100\% \& \$5\_\{\textasciitilde{}\textasciicircum{}\# \\" in table
+    assert r"two lines \\" in table
 
 
 @pytest.mark.parametrize(

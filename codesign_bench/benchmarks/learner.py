@@ -32,7 +32,7 @@ from codesign_bench.machine import available_cores, computes_in_bfloat16, host_f
 from codesign_bench.method import Problem, load_method, method_names
 from codesign_bench.processes import thread_environment
 from codesign_bench.seeding import Streams
-from codesign_bench.storage.files import write_json
+from codesign_bench.storage.files import json_bytes, write_output
 from codesign_bench.task import load_task
 
 
@@ -204,10 +204,7 @@ def _write(out: Path, work: Workload, top: Mapping[str, float], found: Mapping[s
         "code": code_version().to_json(),
         "host": host_facts(work.cores),
     }
-    try:
-        write_json(out, content)
-    except OSError as error:
-        raise UserError(f"--out {out}: not writable ({error.strerror})") from error
+    write_output(f"--out {out}", out, json_bytes(content))
 
 
 def _in_process(name: str, work: Workload) -> Speed:

@@ -5,7 +5,7 @@ Shapes: `N` seeds, `G` evaluation instances.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from codesign_bench.evaluation.extrapolation import load_outside
 from codesign_bench.evaluation.sensitivity import load_sensitivity
 from codesign_bench.stats import CELL_KEYS, MIN_SEEDS
 from codesign_bench.storage.cells import reported_cells
-from codesign_bench.storage.frames import load_evaluations, load_results
+from codesign_bench.storage.frames import load_evaluations, stored_curves
 from codesign_bench.storage.reference_points import load_reference_points
 from codesign_bench.task import load_task, task_names
 
@@ -134,13 +134,13 @@ def load_evidence(results: Path) -> Evidence:
     """
     records = [cell.record for cell in reported_cells(results)]
     profiles = {record.profile for record in records}
-    curves = _read(load_results, results, ("return_mean", "success_rate"))
-    evaluations = _read(load_evaluations, results, ("return", "success", "material", "effort"))
-    sensitivity = _read(load_sensitivity, results, ("tool", "goal", "success"))
-    outside = _read(load_outside, results, ("task", "method", "seed", "instance", "success"))
-    regions = _read(load_cutout_regions, results, ("task", "method", "cutout", "region", "seed", "instance", "return"))
-    deployment = _read(load_deployment, results, ("task", "kind", "tool", "row", "column", "success"))
-    points = _read(load_reference_points, results, ("task", "task_version", "point", "return_mean", "success_rate"))
+    curves = _read(stored_curves, results)
+    evaluations = _read(load_evaluations, results)
+    sensitivity = _read(load_sensitivity, results)
+    outside = _read(load_outside, results)
+    regions = _read(load_cutout_regions, results)
+    deployment = _read(load_deployment, results)
+    points = _read(load_reference_points, results)
     references = _of_versions(points, {(record.task, record.task_version) for record in records})
     if evaluations.empty and sensitivity.empty:
         raise UserError(f"no finished cell in '{results}' yet; create some with: codesign-bench run --out {results}")
@@ -149,22 +149,12 @@ def load_evidence(results: Path) -> Evidence:
     return Evidence(curves, evaluations, sensitivity, outside, regions, deployment, widths, profile, references)
 
 
-def _read(read: Callable[[Path], pd.DataFrame], results: Path, needed: Sequence[str]) -> pd.DataFrame:
-    """Return a frame, empty if there is none; the claims that need it report this.
-
-    Raises:
-        UserError: a value is missing in a column of `needed`.
-    """
+def _read(read: Callable[[Path], pd.DataFrame], results: Path) -> pd.DataFrame:
+    """Return a frame, empty if there is none that can be used; the claims that need it report this."""
     try:
-        frame = read(results)
+        return read(results)
     except UserError:
         return pd.DataFrame()
-    except (ValueError, TypeError, KeyError, OSError) as error:
-        raise UserError(f"cannot read a table in '{results}': {' '.join(str(error).split())}") from error
-    for column in needed:
-        if column not in frame.columns or frame[column].isna().any():
-            raise UserError(f"a table in '{results}' is damaged or not ours: values of '{column}' are missing")
-    return frame
 
 
 def _of_versions(points: pd.DataFrame, played: set[tuple[str, int]]) -> pd.DataFrame:

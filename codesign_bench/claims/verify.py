@@ -30,8 +30,9 @@ from codesign_bench.errors import UserError
 from codesign_bench.seeding import generator
 from codesign_bench.storage import provenance
 from codesign_bench.storage.cells import find_cells
-from codesign_bench.storage.files import write_bytes, write_json
-from codesign_bench.text_tables import markdown
+from codesign_bench.storage.files import Outputs, json_bytes
+from codesign_bench.text_tables import markdown, plain_markdown
+from codesign_bench.visible_text import on_one_line
 
 MARKDOWN_FILE, JSON_FILE = "claims.md", "claims.json"
 SEED = 0
@@ -126,10 +127,19 @@ def _row(claim: Claim, evidence: Evidence, results: str) -> Row:
         return Row(claim, Finding(UNDECIDED, math.nan, note=str(error)), needs)
 
 
-def verify(study: Claimant, results: Path, out: Path, console: Console, *, measure: bool = False) -> None:
+def verify(
+    study: Claimant,
+    results: Path,
+    out: Path,
+    console: Console,
+    *,
+    measure: bool = False,
+    left_out: Sequence[str] = (),
+) -> None:
     """Judge the claims of a study on the results folder, print the table and write it into `out`.
 
-    With `measure`, outcomes that claims need but cells do not have are measured first, which takes minutes.
+    With `measure`, outcomes that claims need but cells do not have are measured first, which takes minutes. `left_out`
+    names the files that cannot be used; it is only written.
 
     Raises:
         UserError: there are no results, they cannot be read, or `out` is not writable.
@@ -141,7 +151,7 @@ def verify(study: Claimant, results: Path, out: Path, console: Console, *, measu
         evidence = load_evidence(results)
     rows = judge(claims, evidence, str(results))
     made = provenance.differences({results.name: provenance.records_of(find_cells(results))})
-    paths = write_rows(rows, study, results, out, made)
+    paths = write_rows(rows, study, results, out, made, left_out)
     print_rows(rows, console)
     for line in (*made, *map(str, paths)):
         log(line)
@@ -201,23 +211,32 @@ def missing(rows: Sequence[Row]) -> list[str]:
     return list(dict.fromkeys(command for row in rows if row.asked for command in row.needs))
 
 
-def write_rows(rows: Sequence[Row], study: Claimant, results: Path, out: Path, made: Sequence[str] = ()) -> list[Path]:
-    """Write the rows as Markdown and JSON into `out` and return the paths; `made` tells how cells were made otherwise.
+def write_rows(
+    rows: Sequence[Row],
+    study: Claimant,
+    results: Path,
+    out: Path,
+    made: Sequence[str] = (),
+    left_out: Sequence[str] = (),
+) -> list[Path]:
+    """Write the rows as Markdown and JSON into `out`, both or none, and return the paths.
+
+    `made` tells how cells were made otherwise, `left_out` which files cannot be used.
 
     Raises:
         UserError: `out` is not writable.
     """
+    told = study, results, made, left_out
     paths = [out / JSON_FILE, out / MARKDOWN_FILE]
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        write_json(paths[0], as_json(rows, study, results, made))
-        write_bytes(paths[1], as_markdown(rows, study, results, made).encode())
-    except OSError as error:
-        raise UserError(f"--out {out}: not writable ({error.strerror})") from error
+    with Outputs(f"--out {out}") as outputs:
+        outputs.write(paths[0], json_bytes(as_json(rows, *told)))
+        outputs.write(paths[1], as_markdown(rows, *told))
     return paths
 
 
-def as_json(rows: Sequence[Row], study: Claimant, results: Path, made: Sequence[str] = ()) -> dict[str, Any]:
+def as_json(
+    rows: Sequence[Row], study: Claimant, results: Path, made: Sequence[str] = (), left_out: Sequence[str] = ()
+) -> dict[str, Any]:
     """Return everything that is known of each claim, as JSON values; what is not finite is None or text."""
     found, checks = apart(rows)
     return {
@@ -225,6 +244,7 @@ def as_json(rows: Sequence[Row], study: Claimant, results: Path, made: Sequence[
         "study": study.name,
         "results": str(results),
         "made": list(made),
+        "left_out": list(left_out),
         "interval": {"confidence": stats.CONFIDENCE},
         "adjustment": {"method": "Holm", "level": LEVEL, "family": "claims of one rule that have a p-value"},
         "claims": [_entry(row) for row in found],
@@ -254,14 +274,16 @@ def _entry(row: Row) -> dict[str, Any]:
     }
 
 
-def as_markdown(rows: Sequence[Row], study: Claimant, results: Path, made: Sequence[str] = ()) -> str:
+def as_markdown(
+    rows: Sequence[Row], study: Claimant, results: Path, made: Sequence[str] = (), left_out: Sequence[str] = ()
+) -> str:
     """Return the page: the tables of claims, the rules that judged them, and the commands for missing data."""
     asked = [row for row in rows if row.asked]
     found, checks = apart(asked)
     rules = {row.claim.rule.kind: (row.claim.rule.statistic, row.claim.rule.words) for row in asked}
     parts = [
         f"# {study.title}: what the results say of its claims\n",
-        f"Results: `{results}`. {summary(rows)}. {HOW_SURE}\n",
+        f"Results: `{on_one_line(str(results))}`. {plain_markdown(summary(rows))}. {HOW_SURE}\n",
         by_rule(asked),
         "## Contradicted\n",
         contradicted(asked),
@@ -276,8 +298,10 @@ def as_markdown(rows: Sequence[Row], study: Claimant, results: Path, made: Seque
     ]
     if made:
         parts += ["## How the cells were made\n", provenance.as_markdown(made)]
+    if left_out:
+        parts += ["## Files that cannot be used\n", "\n".join(f"- {plain_markdown(line)}" for line in left_out) + "\n"]
     if missing(rows):
-        parts += ["## Data that are missing\n", "```\n" + "\n".join(missing(rows)) + "\n```\n"]
+        parts += ["## Data that are missing\n", "```\n" + "\n".join(map(on_one_line, missing(rows))) + "\n```\n"]
     return "\n".join(parts)
 
 
@@ -326,7 +350,9 @@ def _by_rule(rows: Sequence[Row], mark: str) -> list[tuple[str, ...]]:
 def contradicted(rows: Sequence[Row]) -> str:
     """Return a Markdown list of the claims that the results contradict, with their findings."""
     lines = [
-        f"- {row.claim.sentence}: {row.interval} ({'; '.join(filter(None, (row.finding.n, row.finding.note)))})"
+        plain_markdown(
+            f"- {row.claim.sentence}: {row.interval} ({'; '.join(filter(None, (row.finding.n, row.finding.note)))})"
+        )
         for row in rows
         if row.finding.verdict == CONTRADICTED
     ]

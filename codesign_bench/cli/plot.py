@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from codesign_bench.cli.arguments import DEFAULT_FIGURES, add_out, add_results, add_study
-from codesign_bench.console import printer
+from codesign_bench.console import printer, tell_left_out
 from codesign_bench.study import load_study
 
 HELP = "draw figures from results"
@@ -33,7 +33,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     """Draw the figures and print their paths."""
     from codesign_bench.figures.drawing import draw_figures
+    from codesign_bench.storage.survey import lines, survey
 
     study = load_study(options.study)
+    for results in filter(None, (options.results, options.compare)):
+        tell_left_out(lines(results, survey(results)))
     draw_figures(options.figures, options.results, options.out, printer(console), options.compare, study)
     return 0

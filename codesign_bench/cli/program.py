@@ -13,6 +13,7 @@ from rich.console import Console
 from codesign_bench import __version__
 from codesign_bench.errors import UserError
 from codesign_bench.plugins import import_modules
+from codesign_bench.visible_text import visible
 
 PROGRAM = "codesign-bench"
 EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
@@ -39,7 +40,7 @@ class _Parser(argparse.ArgumentParser):
     """An argument parser that reports bad input in two lines."""
 
     def error(self, message: str) -> NoReturn:
-        print(f"{self.prog}: {' '.join(message.split())}\nsee: {self.prog} --help", file=sys.stderr)
+        print(f"{self.prog}: {visible(' '.join(message.split()))}\nsee: {self.prog} --help", file=sys.stderr)
         raise SystemExit(EXIT_BAD_INPUT)
 
 
@@ -55,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         import_modules(options.imports)
         return int(options.command(options, console))
     except UserError as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        print(visible(f"{PROGRAM}: {error}"), file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
         print("\ninterrupted; the same command resumes", file=sys.stderr)

@@ -8,7 +8,7 @@ import os
 from rich.console import Console
 
 from codesign_bench.cli.arguments import ALL, add_results, check_at_least_one, chosen_tasks, integer
-from codesign_bench.console import printer
+from codesign_bench.console import printer, tell_left_out
 
 HELP = "measure reference points: idling, random tools, the script, the best single tool, the best known"
 
@@ -29,10 +29,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Measure what is missing, renew the best known, and print the points."""
     from codesign_bench.evaluation.reference_points import measure_missing
     from codesign_bench.storage.reference_points import load_reference_points
+    from codesign_bench.storage.survey import lines, survey
     from codesign_bench.text_tables import markdown
 
     check_at_least_one(options, "jobs")
     tasks, log = chosen_tasks(options.task), printer(console)
+    tell_left_out(lines(options.results, survey(options.results)))
     jobs = options.jobs or os.cpu_count() or 1
     measure_missing(options.results, tasks, log, again=options.again, jobs=jobs)
     points = load_reference_points(options.results)

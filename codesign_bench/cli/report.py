@@ -7,7 +7,7 @@ import argparse
 from rich.console import Console
 
 from codesign_bench.cli.arguments import DEFAULT_REPORT, add_out, add_results, add_study
-from codesign_bench.console import printer
+from codesign_bench.console import printer, tell_left_out
 from codesign_bench.study import load_study
 
 HELP = "write one HTML page that summarises a results folder"
@@ -23,6 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     """Write the page and print its path."""
     from codesign_bench.report.page import write_report
+    from codesign_bench.storage.survey import lines, survey
 
+    tell_left_out(lines(options.results, survey(options.results)))
     write_report(options.results, options.out, printer(console), load_study(options.study))
     return 0

@@ -9,10 +9,11 @@ from pathlib import Path
 from rich.console import Console
 
 from codesign_bench.cli.arguments import add_results
-from codesign_bench.console import print_table, printer
+from codesign_bench.console import print_table, printer, tell_left_out
 from codesign_bench.errors import UserError
-from codesign_bench.storage.cells import find_cells
+from codesign_bench.storage.cells import scan
 from codesign_bench.storage.status import status_row
+from codesign_bench.storage.survey import lines, survey
 
 HELP = "list the cells in a results folder and their progress"
 
@@ -29,12 +30,14 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def print_status(console: Console, out: Path) -> None:
-    """Print one line per cell below `out`, the counts, and the errors of failed cells.
+    """Print one line per cell below `out`, the counts, the errors of failed cells, and what cannot be used.
 
     Raises:
         UserError: the folder does not exist, or contains no cells.
     """
-    cells, log = list(find_cells(out)), printer(console)
+    contents, log = scan(out), printer(console)
+    cells = contents.cells
+    tell_left_out(lines(out, survey(out, contents)))
     if not cells:
         raise UserError(f"no cells in '{out}' yet; run some with: codesign-bench run --out {out}")
     rows = [status_row(out, cell) for cell in cells]

@@ -7,6 +7,7 @@ import argparse
 from rich.console import Console
 
 from codesign_bench.cli.arguments import DEFAULT_CLAIMS, add_out, add_results, add_study
+from codesign_bench.console import tell_left_out
 from codesign_bench.study import load_study
 
 HELP = "check which claims of a study the results support"
@@ -25,6 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     """Check the claims, print the table and write it."""
     from codesign_bench.claims.verify import verify
+    from codesign_bench.storage.survey import lines, survey
 
-    verify(load_study(options.study), options.results, options.out, console, measure=options.measure)
+    left_out = lines(options.results, survey(options.results))
+    tell_left_out(left_out)
+    verify(load_study(options.study), options.results, options.out, console, measure=options.measure, left_out=left_out)
     return 0

@@ -25,8 +25,8 @@ from codesign_bench.deployment.tables import (
 )
 from codesign_bench.errors import UserError
 from codesign_bench.seeding import generator
-from codesign_bench.storage.files import write_bytes, write_json
-from codesign_bench.storage.layout import open_folder, write_rows
+from codesign_bench.storage.files import Outputs, json_bytes
+from codesign_bench.storage.layout import open_folder, rows_bytes
 from codesign_bench.task import Behaviour, Floats, Task, deployment_of
 from codesign_bench.task.robot import IDEAL
 
@@ -63,7 +63,8 @@ def deploy(
         source: source of the policy, for the summary.
 
     Raises:
-        UserError: the task cannot be deployed, a number of `order` is invalid, or `out` is not writable.
+        UserError: the task cannot be deployed, a number of `order` is invalid, or a file cannot be written;
+            then none is.
     """
     if order.trials < 1:
         raise UserError(f"--trials must be at least 1, not {order.trials}")
@@ -75,27 +76,24 @@ def deploy(
     open_folder(out)
     folder = out / FOLDER / task.name
     path = folder / (protocol_file(order.policy_seed) if order.protocol else TRIALS_FILE)
-    (folder / PICTURES_FOLDER).mkdir(parents=True, exist_ok=True)
     unit_designs = {tool: deployment.unit_design(settings.own[tool - 1]) for tool in tools}
     in_training = _solved_in_training(task, policy, order, unit_designs)
     designs: dict[str, dict[str, float]] = {}
     rows = []
-    for trial in planned:
-        film = Film(f"{task.title}, tool {trial.tool}", settings.max_steps) if order.gifs else None
-        rng = generator(order.seed, f"deploy {task.name} {trial.name}")
-        rollout = deployment.play(trial.instance, unit_designs[trial.tool], rng, film)
-        values = deployment.episodes.designs[0].tolist()
-        designs[str(trial.tool)] = dict(zip(task.design_space.names, values, strict=True))
-        where = {name: getattr(trial, name) for name in ("kind", "tool", "trial", "row", "column")}
-        where |= {SEED: order.policy_seed, SOLVED_IN_TRAINING: in_training[trial.tool]}
-        rows.append(row(task, settings, trial.instance, rollout, **where))
-        if film is not None:
-            write_bytes(folder / PICTURES_FOLDER / f"{trial.name}.gif", film.gif(task.control_period))
-        say(_line(trial, rows[-1]))
-    write_rows(path, rows)
-    write_json(
-        path.with_suffix(SUMMARY_SUFFIX),
-        {
+    with Outputs(f"--out {out}") as outputs:
+        for trial in planned:
+            film = Film(f"{task.title}, tool {trial.tool}", settings.max_steps) if order.gifs else None
+            rng = generator(order.seed, f"deploy {task.name} {trial.name}")
+            rollout = deployment.play(trial.instance, unit_designs[trial.tool], rng, film)
+            values = deployment.episodes.designs[0].tolist()
+            designs[str(trial.tool)] = dict(zip(task.design_space.names, values, strict=True))
+            where = {name: getattr(trial, name) for name in ("kind", "tool", "trial", "row", "column")}
+            where |= {SEED: order.policy_seed, SOLVED_IN_TRAINING: in_training[trial.tool]}
+            rows.append(row(task, settings, trial.instance, rollout, **where))
+            if film is not None:
+                outputs.write(folder / PICTURES_FOLDER / f"{trial.name}.gif", film.gif(task.control_period))
+            say(_line(trial, rows[-1]))
+        summary = {
             "version": __version__,
             "task": task.name,
             "policy": source,
@@ -104,8 +102,9 @@ def deploy(
             "max_steps": settings.max_steps,
             "designs": designs,
             "tools": summarise(rows),
-        },
-    )
+        }
+        outputs.write(path, rows_bytes(rows))
+        outputs.write(path.with_suffix(SUMMARY_SUFFIX), json_bytes(summary))
     say(str(path))
     return rows
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from codesign_bench.deployment.rollout import Rollout
 from codesign_bench.errors import UserError
+from codesign_bench.storage.measurements import DEPLOYMENT, usable_tables
 from codesign_bench.task import Floats, Task
 from codesign_bench.task.robot import ArmReport, RobotTrials
 
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FOLDER = "deployment"
-PROTOCOL_FILES, TRIALS_FILE = "protocol*.csv", "trials.csv"
-"""Tables of the paper's full protocol, one per policy, and of trials chosen by a user."""
+TRIALS_FILE = "trials.csv"
+"""The table of trials chosen by a user; those of the paper's full protocol are one per policy."""
 SEED, SOLVED_IN_TRAINING = "policy_seed", "solved_in_training"
 """Columns: the seed of the policy, and whether it solves the tool's own instance with the gantry of training."""
 SUMMARY_SUFFIX = ".json"
@@ -86,12 +87,12 @@ def load_deployment(results: str | Path) -> pd.DataFrame:
     """
     import pandas as pd
 
-    paths = sorted(Path(results).glob(f"{FOLDER}/*/{PROTOCOL_FILES}"))
-    if not paths:
+    tables = usable_tables(Path(results), DEPLOYMENT)
+    if not tables:
         raise UserError(
             f"no deployment in '{results}' yet; create one with: codesign-bench deploy --policy CELL --protocol "
             f"--out {results}"
         )
-    trials = pd.concat([pd.read_csv(path) for path in paths], ignore_index=True)
+    trials = pd.concat(tables, ignore_index=True)
     seeds = trials[SEED] if SEED in trials.columns else pd.Series(0.0, index=trials.index)
     return trials.assign(**{SEED: seeds.fillna(0).astype(int)})

@@ -21,6 +21,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.seeding import generator
 from codesign_bench.storage.cells import StoredCell, find_cells
+from codesign_bench.storage.measurements import CUTOUT_REGIONS, usable_tables
 from codesign_bench.storage.policies import policy_of
 from codesign_bench.storage.tables import read_table, write_table
 from codesign_bench.task import EVALUATION_SEED, Floats, Task, load_task
@@ -59,7 +60,7 @@ def measure_cutout_regions(results: Path, task: str, method: str, fractions: Seq
     import pandas as pd
 
     path = results / FOLDER / f"{task}-{method}.csv"
-    table = read_table(path)
+    table = read_table(path, CUTOUT_REGIONS.form)
     known = set() if table is None else set(zip(table["cutout"], table["region"], table["seed"], strict=True))
     parts = [] if table is None else [table]
     for region in fractions:
@@ -83,7 +84,7 @@ def load_cutout_regions(results: Path) -> pd.DataFrame:
     """
     import pandas as pd
 
-    tables = [pd.read_csv(path) for path in sorted((results / FOLDER).glob("*.csv"))]
+    tables = usable_tables(results, CUTOUT_REGIONS)
     if not tables:
         raise UserError(f"not measured yet; measure it with: codesign-bench verify --measure --results {results}")
     return pd.concat(tables, ignore_index=True)

@@ -20,6 +20,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.seeding import generator
 from codesign_bench.storage.cells import StoredCell, reported_cells
+from codesign_bench.storage.measurements import OUTSIDE_REGION, usable
 from codesign_bench.storage.policies import policy_of
 from codesign_bench.storage.tables import read_table, write_table
 from codesign_bench.task import EVALUATION_SEED, Floats, Task, load_task
@@ -70,7 +71,7 @@ def load_or_measure(
     tables = []
     for task, method in pairs:
         path = _path(results, task, method, variant)
-        table = read_table(path)
+        table = read_table(path, OUTSIDE_REGION.form) if measure_missing else usable(path, OUTSIDE_REGION)
         seeds = set() if table is None else set(table["seed"])
         new = {seed: cell for seed, cell in _finished(results, task, method, variant).items() if seed not in seeds}
         if measure_missing and new:

@@ -23,7 +23,8 @@ from codesign_bench.evaluation.sensitivity import GOALS, RANDOM_TOOLS, play_tool
 from codesign_bench.registry import in_order
 from codesign_bench.seeding import generator
 from codesign_bench.storage.cells import StoredCell, find_cells
-from codesign_bench.storage.layout import EVALUATION_FILE
+from codesign_bench.storage.measurements import REFERENCE_INSTANCES, REFERENCE_POINTS
+from codesign_bench.storage.reading import UnusableFile
 from codesign_bench.storage.reference_points import (
     ANY_TOOL,
     BEST_KNOWN,
@@ -36,7 +37,7 @@ from codesign_bench.storage.reference_points import (
     SCRIPT,
     SINGLE_TOOL,
 )
-from codesign_bench.storage.tables import read_table, write_table
+from codesign_bench.storage.tables import read_table, write_tables
 from codesign_bench.task import EVALUATION_SEED, Behaviour, Floats, Task, load_task
 from codesign_bench.task.behaviours import Idle, Joined, RandomBehaviour
 
@@ -134,17 +135,18 @@ def measure_missing(results: Path, tasks: Iterable[str], log: Log, *, again: boo
         jobs: processes that play side by side.
 
     Raises:
-        UserError: the folder cannot be written.
+        UserError: the folder cannot be written, or what it has cannot be used; nothing of it is replaced then.
     """
     for name in tasks:
+        known = _known(results)  # read before anything is played
         task = load_task(name)
         points = [] if again else _stored(task, results)
         if not points:
             log(f"playing the reference points of {name}; kept in {results / FILE}")
             points = measure(task, jobs=jobs, tried=None if again else stored_table(results, name))
         points.append(best_known(task, points, results))
-        _replace(results, results / FILE, name, summary_table(task, points))
-        _replace(results, results / INSTANCES_FILE, name, instance_table(task, points))
+        new = {FILE: summary_table(task, points), INSTANCES_FILE: instance_table(task, points)}
+        write_tables(results, {results / file: _replaced(known[file], name, table) for file, table in new.items()})
 
 
 def summary_table(task: Task, points: Sequence[Point]) -> pd.DataFrame:
@@ -236,13 +238,16 @@ def _play_all(task: Task, designs: Floats, instances: Floats, jobs: int) -> tupl
 
 def _cells(task: Task, results: Path) -> Iterator[tuple[str, pd.DataFrame]]:
     """Yield name and last evaluation of each finished cell that was judged on the task's instances."""
-    import pandas as pd
-
     instances, columns = task.evaluation_instances(), [f"instance_{name}" for name in task.instance_space.names]
     for cell in find_cells(results) if results.is_dir() else ():
         if not _counts(cell, task):
             continue
-        table = pd.read_csv(cell.folder / EVALUATION_FILE)
+        try:
+            table = cell.evaluation()
+        except UnusableFile:
+            continue
+        if table is None:
+            continue
         same = len(table) == len(instances) and set(columns) <= set(table.columns)
         if same and np.allclose(table[columns], instances):
             yield f"{cell.record.method} seed {cell.record.seed}", table
@@ -252,12 +257,12 @@ def _counts(cell: StoredCell, task: Task) -> bool:
     """Return whether a cell is finished, varies nothing and belongs to this version of the task."""
     record = cell.record
     own = (record.task, record.variant, getattr(record, "task_version", 1))
-    return cell.is_done and own == (task.name, DEFAULT, version_of(task)) and (cell.folder / EVALUATION_FILE).exists()
+    return cell.is_done and own == (task.name, DEFAULT, version_of(task))
 
 
 def _stored(task: Task, results: Path) -> list[Point]:
     """Return the points of this version of the task that were measured before, without the best known."""
-    summary, instances = read_table(results / FILE), read_table(results / INSTANCES_FILE)
+    summary, instances = _known(results).values()
     if summary is None or instances is None:
         return []
     points = []
@@ -275,13 +280,21 @@ def _own(table: pd.DataFrame, task: Task) -> pd.Series[bool]:
     return (table["task"] == task.name) & (table["task_version"] == version_of(task))
 
 
-def _replace(results: Path, path: Path, name: str, table: pd.DataFrame) -> None:
+def _known(results: Path) -> dict[str, pd.DataFrame | None]:
+    """Return both tables by their names, None where there is none.
+
+    Raises:
+        UnusableFile: one cannot be used.
+    """
+    kinds = {FILE: REFERENCE_POINTS, INSTANCES_FILE: REFERENCE_INSTANCES}
+    return {name: read_table(results / name, kind.form) for name, kind in kinds.items()}
+
+
+def _replaced(known: pd.DataFrame | None, name: str, table: pd.DataFrame) -> pd.DataFrame:
     """Put the rows of one task in place of those that a table has, tasks in the order of listings."""
     import pandas as pd
 
-    known = read_table(path)
     if known is not None:
         table = pd.concat([known[known["task"] != name], table], ignore_index=True)
     order = in_order("tasks", table["task"])
-    sorted_table = table.sort_values("task", key=lambda tasks: tasks.map(order.index), kind="stable")
-    write_table(results, path, sorted_table)
+    return table.sort_values("task", key=lambda tasks: tasks.map(order.index), kind="stable")

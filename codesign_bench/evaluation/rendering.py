@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from codesign_bench.errors import UserError
-from codesign_bench.storage.files import write_bytes
+from codesign_bench.storage.files import write_output
 from codesign_bench.task import Behaviour, Frame, Task
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.play import play
@@ -55,11 +55,7 @@ def render(task: Task, behaviour: Behaviour, path: Path, episodes: int = 4) -> s
     moments = list(_moments(task, behaviour, episodes, stride))
     solved = sum("success" in caption for caption in moments[-1].captions)
     content = animation(moments, stride * task.control_period) if animated else _sheet(moments)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(path, content)
-    except OSError as error:
-        raise UserError(f"--out {path}: not writable ({error.strerror})") from error
+    write_output(f"--out {path}", path, content)
     return f"{path}: {solved} of {len(moments[-1].captions)} episodes solved"
 
 

@@ -20,7 +20,9 @@ from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.seeding import generator
-from codesign_bench.storage.tables import read_table, write_table
+from codesign_bench.storage.measurements import DESIGN_SENSITIVITY, usable
+from codesign_bench.storage.reading import is_there
+from codesign_bench.storage.tables import write_table
 from codesign_bench.task import EVALUATION_SEED, Floats, Task, load_task, task_names
 from codesign_bench.task.behaviours import GivenDesigns
 from codesign_bench.task.episodes import Episodes
@@ -108,7 +110,7 @@ def measure_missing(results: Path, tasks: Iterable[str], log: Log) -> None:
     """
     for name in tasks:
         path = _path(results, name)
-        if path.exists():
+        if is_there(path):  # also if it is damaged: what was measured is never overwritten
             continue
         log(f"{FOLDER}: playing {RANDOM_TOOLS} random tools on {GOALS} goals of {name}; kept in {path}")
         try:
@@ -134,8 +136,8 @@ def load_sensitivity(results: Path) -> pd.DataFrame:
 
 
 def stored_table(results: Path, task_name: str) -> pd.DataFrame | None:
-    """Return the table of one task, or None if there is none."""
-    return read_table(_path(results, task_name))
+    """Return the table of one task, or None if there is none that can be used."""
+    return usable(_path(results, task_name), DESIGN_SENSITIVITY)
 
 
 def _path(results: Path, task_name: str) -> Path:

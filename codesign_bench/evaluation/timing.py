@@ -5,6 +5,7 @@ Shapes: `O` observation.
 
 from __future__ import annotations
 
+import math
 import time
 from pathlib import Path
 from statistics import median
@@ -44,7 +45,7 @@ def timing_frame(results: Path) -> pd.DataFrame:
         if not cell.is_done or record.variant != DEFAULT:
             continue
         pair = (record.task, record.method)
-        is_timed = pair not in timed and cell.has_policy and not misfit(cell)
+        is_timed = pair not in timed and _fits(cell)
         if is_timed:
             timed.add(pair)
         rows.append(
@@ -55,15 +56,23 @@ def timing_frame(results: Path) -> pd.DataFrame:
                 "seed": record.seed,
                 "profile": record.profile,
                 "env_steps": record.env_steps,
-                "train_s": record.timings.train_s,
+                "train_s": math.nan if record.timings.train_s is None else record.timings.train_s,
                 "cores": record.threads,
-                "cpu": record.host["cpu"],
+                "cpu": str(record.host.get("cpu")),
                 "inference_s": inference_seconds(cell) if is_timed else float("nan"),
             }
         )
     if not rows:
         raise UserError(f"no finished cell in '{results}' yet; create some with: codesign-bench run --out {results}")
     return pd.DataFrame(rows)
+
+
+def _fits(cell: StoredCell) -> bool:
+    """Return whether a cell has a policy that can act on its task."""
+    try:
+        return cell.has_policy and not misfit(cell)
+    except UserError:  # damaged, or of a task or method that is not here
+        return False
 
 
 def inference_seconds(cell: StoredCell) -> float:

@@ -18,8 +18,8 @@ from codesign_bench.errors import UserError
 from codesign_bench.fabrication.picture import picture
 from codesign_bench.fabrication.printability import Print, judge
 from codesign_bench.fabrication.solids import MILLIMETRES, handle_of, scaled, thickness, tool_solid
-from codesign_bench.storage.files import write_bytes, write_json
-from codesign_bench.storage.layout import write_rows
+from codesign_bench.storage.files import Outputs, json_bytes, make_folder
+from codesign_bench.storage.layout import rows_bytes
 from codesign_bench.task import Behaviour, Box, Floats, Task
 from codesign_bench.task.episodes import Episodes, portions
 from codesign_bench.task.play import designed
@@ -95,44 +95,51 @@ def export(
         source: source of the policy, for the sheets.
 
     Raises:
-        UserError: a file already exists, `out` is not writable, or the extra `export` is not installed.
+        UserError: a file already exists or cannot be written, or the extra `export` is not installed; then no file is
+            written.
     """
     designs, owners = np.unique(_designs(task, policy, order.instances), axis=0, return_inverse=True)
     first = [int(np.flatnonzero(owners == tool)[0]) for tool in range(len(designs))]
     stems = [f"{task.name}-{order.labels[index]}" for index in first]
     _open(out, [f"{stem}.{ending}" for stem in stems for ending in (*SOLID_FORMATS, SHEET_FORMAT, PICTURE_FORMAT)])
     prints, rows = [], []
-    for tool in np.argsort(first).tolist():
-        stem, design = stems[tool], designs[tool]
-        solid = tool_solid(task, design, order.scale)
-        walls = [thickness(scaled(part, order.scale)) for part in (*task.tool_parts(design), *handle_of(task))]
-        result = judge(solid.mesh, MILLIMETRES * min(walls))
-        for kind in SOLID_FORMATS:
-            write_bytes(out / f"{stem}.{kind}", file_content(solid.mesh, kind))
-        write_bytes(out / f"{stem}.{PICTURE_FORMAT}", picture(solid.mesh, stem))
-        served = np.flatnonzero(owners == tool).tolist()
-        write_json(
-            out / f"{stem}.{SHEET_FORMAT}",
-            {
-                "version": __version__,
-                "task": task.name,
-                "policy": source,
-                "scale": order.scale,
-                "instances": {order.labels[n]: _named(task.instance_space, order.instances[n]) for n in served},
-                "design": _named(task.design_space, design),
-                "units": dict(zip(task.design_space.names, task.design_space.units, strict=True)),
-                "printable": result.printable,
-                **asdict(result),
-                "fillet_volume_mm3": solid.fillet_volume,
-                "handle": "the gripper's, added" if handle_of(task) else "the tool's own first link",
-            },
-        )
-        prints.append(result)
-        rows.append(_row(stem, order, served, result))
-        say(_line(stem, result))
-    write_rows(out / TABLE_FILE, rows)
+    with Outputs(f"--out {out}") as outputs:
+        for tool in np.argsort(first).tolist():
+            served = np.flatnonzero(owners == tool).tolist()
+            result = _write_tool(outputs, out / stems[tool], task, designs[tool], order, served, source)
+            prints.append(result)
+            rows.append(_row(stems[tool], order, served, result))
+            say(_line(stems[tool], result))
+        outputs.write(out / TABLE_FILE, rows_bytes(rows))
     say(f"{sum(result.printable for result in prints)} of {len(prints)} tools can be printed in one piece: {out}")
     return prints
+
+
+def _write_tool(
+    outputs: Outputs, stem: Path, task: Task, design: Floats, order: Order, served: list[int], source: str
+) -> Print:
+    """Write the files of one tool, which serves some instances of `order`; return the properties of its print."""
+    solid = tool_solid(task, design, order.scale)
+    walls = [thickness(scaled(part, order.scale)) for part in (*task.tool_parts(design), *handle_of(task))]
+    result = judge(solid.mesh, MILLIMETRES * min(walls))
+    for kind in SOLID_FORMATS:
+        outputs.write(stem.with_name(f"{stem.name}.{kind}"), file_content(solid.mesh, kind))
+    outputs.write(stem.with_name(f"{stem.name}.{PICTURE_FORMAT}"), picture(solid.mesh, stem.name))
+    sheet = {
+        "version": __version__,
+        "task": task.name,
+        "policy": source,
+        "scale": order.scale,
+        "instances": {order.labels[n]: _named(task.instance_space, order.instances[n]) for n in served},
+        "design": _named(task.design_space, design),
+        "units": dict(zip(task.design_space.names, task.design_space.units, strict=True)),
+        "printable": result.printable,
+        **asdict(result),
+        "fillet_volume_mm3": solid.fillet_volume,
+        "handle": "the gripper's, added" if handle_of(task) else "the tool's own first link",
+    }
+    outputs.write(stem.with_name(f"{stem.name}.{SHEET_FORMAT}"), json_bytes(sheet))
+    return result
 
 
 def file_content(mesh: Trimesh, kind: str) -> bytes:
@@ -149,10 +156,7 @@ def _designs(task: Task, policy: Behaviour, instances: Floats) -> Floats:
 
 def _open(out: Path, files: Iterable[str]) -> None:
     """Make the folder `out`; raise an error if one of `files` already exists."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--out {out}: not writable ({error.strerror})") from error
+    make_folder(f"--out {out}", out)
     for name in (TABLE_FILE, *files):
         if (out / name).exists():
             raise UserError(f"--out {out}: {name} already exists; choose another folder")

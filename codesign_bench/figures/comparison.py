@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from codesign_bench.storage.cells import find_cells
-from codesign_bench.storage.frames import LABEL_COLUMN, load_results
+from codesign_bench.storage.frames import LABEL_COLUMN, stored_curves
 from codesign_bench.storage.provenance import differences, records_of
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def with_compared(own: pd.DataFrame, other: Path) -> pd.DataFrame:
     """
     import pandas as pd
 
-    compared = load_results(other)
+    compared = stored_curves(other)
     compared = compared[compared["task"].isin(set(own["task"]))]
     origin = FROM + other.resolve().name
     renamed = {name: compared[name] + origin for name in ("method", LABEL_COLUMN)}

@@ -9,6 +9,7 @@ curves), `NEEDS`, the command that makes what it shows, `texts(frame)`, further 
 from __future__ import annotations
 
 import inspect
+import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,10 +23,11 @@ from codesign_bench.errors import UserError
 from codesign_bench.figures.comparison import made_otherwise, with_compared
 from codesign_bench.figures.source import Request, Source, curves
 from codesign_bench.registry import load_module, names
-from codesign_bench.storage.files import write_bytes
-from codesign_bench.storage.frames import load_results
+from codesign_bench.storage.files import Outputs, make_folder
+from codesign_bench.storage.frames import stored_curves
 from codesign_bench.storage.tables import csv_bytes
 from codesign_bench.study.study import DEFAULT_STUDY, Study, load_study, study_names
+from codesign_bench.visible_text import in_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,8 +77,8 @@ def draw_figures(
     if not wanted and not results.is_dir():
         raise UserError(f"no results folder '{results}'; create one with: codesign-bench run --out {results}")
     if compare is not None:
-        load_results(compare)  # a wrong folder is an error, not a reason to leave the curves out
-    make_folder(out)
+        stored_curves(compare)  # a wrong folder is an error, not a reason to leave the curves out
+    make_folder(f"--out {out}", out)
     drawn: list[Path] = []
     for drawing in _drawings(modules, Request(results, log, named=bool(wanted)), compare):
         drawn = [*save(drawing, out), *drawn]  # the first figure is logged last
@@ -102,16 +104,27 @@ def possible_drawings(results: Path, log: Log, study: Study | None = None) -> It
 
 
 def save(drawing: Drawing, out: Path) -> list[Path]:
-    """Write numbers, vector graphic, picture and texts of `drawing` to `out` and return their paths."""
-    paths = [out / f"{drawing.name}.csv", out / f"{drawing.name}.pdf", out / f"{drawing.name}.png"]
-    write_bytes(paths[0], csv_bytes(drawing.table))
-    for path in paths[1:]:
-        undated = {"CreationDate": None} if path.suffix == ".pdf" else None  # the same results give the same file
-        drawing.figure.savefig(path, metadata=undated)
-    for ending, text in drawing.texts.items():
-        paths.insert(0, out / f"{drawing.name}.{ending}")
-        write_bytes(paths[0], text.encode())
-    return paths
+    """Write numbers, vector graphic, picture and texts of `drawing` to `out`, all of them or none; return their paths.
+
+    Raises:
+        UserError: a file cannot be written; the earlier files are as they were.
+    """
+    files: dict[str, bytes | str] = dict(reversed(list(drawing.texts.items())))
+    files["csv"] = csv_bytes(drawing.table)
+    for ending in ("pdf", "png"):
+        files[ending] = _picture(drawing.figure, ending)
+    with Outputs(f"--out {out}") as outputs:
+        for ending, content in files.items():
+            outputs.write(out / f"{drawing.name}.{ending}", content)
+    return [out / f"{drawing.name}.{ending}" for ending in files]
+
+
+def _picture(figure: Figure, ending: str) -> bytes:
+    """Return a figure as the content of a file."""
+    stream = io.BytesIO()
+    undated = {"CreationDate": None} if ending == "pdf" else None  # the same results give the same file
+    figure.savefig(stream, format=ending, metadata=undated)
+    return stream.getvalue()
 
 
 def _drawings(modules: Mapping[str, ModuleType], request: Request, compare: Path | None = None) -> Iterator[Drawing]:
@@ -154,9 +167,18 @@ def _draw(name: str, module: Any, frame: pd.DataFrame) -> Drawing:
         title=module.TITLE,
         about=" ".join((inspect.getdoc(module) or "").split("\n\n")[0].split()),
         table=module.data(frame),
-        figure=module.draw(frame),
+        figure=module.draw(_as_drawn(frame)),
         texts=module.texts(frame) if hasattr(module, "texts") else {},
     )
+
+
+def _as_drawn(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the frame with its texts as matplotlib should show them, for they come from results."""
+    names = [name for name in frame.columns if not pd.api.types.is_numeric_dtype(frame[name])]
+    shown = {
+        name: frame[name].map(lambda value: in_figure(value) if isinstance(value, str) else value) for name in names
+    }
+    return frame.assign(**shown)
 
 
 def _close(figure: Figure) -> None:
@@ -164,17 +186,3 @@ def _close(figure: Figure) -> None:
     import matplotlib.pyplot as plt
 
     plt.close(figure)
-
-
-def make_folder(out: Path) -> None:
-    """Make the folder `out`.
-
-    Raises:
-        UserError: it is not writable.
-    """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        write_bytes(out / ".writable", b"")
-        (out / ".writable").unlink()
-    except OSError as error:
-        raise UserError(f"--out {out}: not writable ({error.strerror})") from error

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import reported_cells
-from codesign_bench.storage.frames import load_evaluations, load_results
+from codesign_bench.storage.frames import load_evaluations, stored_curves
 from codesign_bench.storage.reference_points import with_reference_points
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ Source: TypeAlias = "Callable[[Request], pd.DataFrame]"
 
 def curves(request: Request) -> pd.DataFrame:
     """Return the learning curves of all cells, as `codesign_bench.load_results` does."""
-    return load_results(request.results)
+    return stored_curves(request.results)
 
 
 def curves_with_references(request: Request) -> pd.DataFrame:
@@ -46,7 +46,7 @@ def curves_with_references(request: Request) -> pd.DataFrame:
 
     `reference_points_in` reads the points.
     """
-    return with_reference_points(load_results(request.results), request.results)
+    return with_reference_points(stored_curves(request.results), request.results)
 
 
 def evaluations(request: Request) -> pd.DataFrame:

@@ -11,10 +11,10 @@ from codesign_bench.cell.variant import DEFAULT_NAME
 from codesign_bench.console import duration
 from codesign_bench.errors import UserError
 from codesign_bench.registry import in_order
-from codesign_bench.storage.cells import find_cells
-from codesign_bench.storage.layout import CELL_PATTERN
+from codesign_bench.storage.cells import scan
 from codesign_bench.storage.records import CellRecord, Timings
 from codesign_bench.storage.status import status_row
+from codesign_bench.storage.survey import lines, survey
 
 from .tables import NOTHING, Table, listed
 
@@ -59,22 +59,20 @@ class CellFailure:
 
 
 def read_cells(results: Path) -> tuple[list[PageCell], list[str]]:
-    """Return every reported cell below `results`, and the names of those with a damaged or foreign cell file.
+    """Return every reported cell below `results`, and each file that cannot be used with its reason.
 
     Raises:
         UserError: the folder does not exist or contains no cells.
     """
-    found = list(find_cells(results))
+    contents = scan(results)
     cells = [
         PageCell(cell.folder.relative_to(results).as_posix(), cell.record, cell.status, status_row(results, cell))
-        for cell in found
+        for cell in contents.cells
         if cell.is_reported
     ]
-    read = {cell.folder for cell in found}
-    damaged = [path.parent for path in sorted(results.glob(CELL_PATTERN)) if path.parent not in read]
     if not cells:
         raise UserError(f"no cells in '{results}' yet; create some with: codesign-bench run --out {results}")
-    return cells, [folder.relative_to(results).as_posix() for folder in damaged]
+    return cells, lines(results, survey(results, contents))
 
 
 def variants(cells: Sequence[PageCell]) -> list[str]:

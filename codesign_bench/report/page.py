@@ -17,13 +17,13 @@ from markupsafe import Markup, escape
 from codesign_bench.code_version import code_version
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
-from codesign_bench.figures.drawing import make_folder
 from codesign_bench.stats import CELL_KEYS
-from codesign_bench.storage.files import write_bytes
-from codesign_bench.storage.frames import load_results
+from codesign_bench.storage.files import make_folder, write_output
+from codesign_bench.storage.frames import stored_curves
 from codesign_bench.storage.layout import CURVE_COLUMNS
 from codesign_bench.storage.provenance import differences
 from codesign_bench.study.study import DEFAULT_STUDY, Study, load_study
+from codesign_bench.visible_text import visible
 
 from . import cells as cell_parts
 from . import provenance
@@ -52,7 +52,7 @@ class Page:
     status: Table
     failures: list[CellFailure]
     damaged: list[str]
-    """Unreadable cells."""
+    """Files that cannot be used, each with its reason."""
     cells: Table
     configurations: list[provenance.Configuration]
     differences: list[str]
@@ -83,9 +83,9 @@ def write_report(results: Path, out: Path, log: Log, study: Study | None = None)
     if out.is_dir():
         raise UserError(f"--out {out}: is a folder; give a file in it, e.g. {out / 'report.html'}")
     cells, damaged = read_cells(results)
-    make_folder(out.parent)
+    make_folder(f"--out {out}", out.parent)
     page = gather(results, cells, damaged, study or load_study(DEFAULT_STUDY))
-    write_bytes(out, render(page).encode())
+    write_output(f"--out {out}", out, render(page))
     log(str(out))
 
 
@@ -125,7 +125,7 @@ def render(page: Page) -> str:
         lstrip_blocks=True,
     )
     environment.filters.update(number=number, code=code_spans)
-    return environment.get_template(TEMPLATE).render(page=page, strip_width=STRIP_WIDTH)
+    return visible(environment.get_template(TEMPLATE).render(page=page, strip_width=STRIP_WIDTH))
 
 
 def code_spans(text: str) -> Markup:
@@ -140,6 +140,6 @@ def code_spans(text: str) -> Markup:
 def _curves(results: Path) -> pd.DataFrame:
     """Return the curves of all cells; empty if no cell has been evaluated."""
     try:
-        return load_results(results)
+        return stored_curves(results)
     except UserError:
         return pd.DataFrame(columns=[*CELL_KEYS, "seed", *CURVE_COLUMNS])

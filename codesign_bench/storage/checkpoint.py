@@ -10,29 +10,36 @@ small file on disk always names a complete large file that was saved with it.
 
 from __future__ import annotations
 
-import json
-import os
+import math
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
 import numpy as np
-from safetensors import SafetensorError
-from safetensors.numpy import load, save
 
 from codesign_bench.errors import UserError
 from codesign_bench.method import Array, State
-from codesign_bench.storage.files import dump_json, replacing, write_bytes
+from codesign_bench.storage.arrays import (
+    ARRAYS_BYTES,
+    DAMAGED_HEADER,
+    PIECE,
+    checked_header,
+    load_arrays,
+    open_stream,
+    save_arrays,
+)
+from codesign_bench.storage.files import reason_of, replacing
+from codesign_bench.storage.reading import MEGABYTE, UnusableFile
 
-HEADER = "codesign_bench"
-"""Key of the JSON header in the file's metadata."""
-PIECE = 2**20
-"""Bytes per read when a file is only checked."""
+LARGE_BYTES = 64 * 1024 * MEGABYTE
+"""Largest file of large arrays, which is read array by array."""
 DAMAGED_ZIP = (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError, zlib.error)
 """The exceptions of reading a damaged `.npz` file."""
+RESTART = "delete it to restart the cell"
+"""Said only of a checkpoint whose content was read and is damaged."""
 
 
 @dataclass
@@ -60,27 +67,6 @@ class Checkpoint:
     state: State
     streams: dict[str, Any]
     progress: Progress
-
-
-def save_arrays(path: Path, arrays: Mapping[str, Array], header: Mapping[str, Any]) -> None:
-    """Replace `path` by `arrays` and a JSON `header`, with a checksum."""
-    ordered = {name: np.asarray(array, order="C") for name, array in arrays.items()}
-    text = dump_json({**header, "checksum": _checksum((name, [ordered[name].tobytes()]) for name in sorted(ordered))})
-    write_bytes(path, save(ordered, metadata={HEADER: text}))
-
-
-def load_arrays(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return arrays and header that `save_arrays` wrote.
-
-    Raises:
-        FileNotFoundError: the file does not exist.
-        ValueError: it is damaged or another kind of file.
-    """
-    header = _checked_header(path)
-    try:
-        return load(path.read_bytes()), header
-    except SafetensorError as error:
-        raise ValueError("damaged or not written by codesign-bench") from error
 
 
 def save_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
@@ -133,7 +119,8 @@ def _load_checkpoint(path: Path) -> Checkpoint:
 
 
 def _check_checkpoint(path: Path) -> None:
-    header = _checked_header(path)
+    with open_stream(path, ARRAYS_BYTES) as stream:
+        header = checked_header(stream)
     Progress(**header["progress"])
     _read_large(path, header, _check_member)
 
@@ -142,55 +129,20 @@ def _usable(path: Path, read: Callable[[Path], Any]) -> Any:
     """Return the result of `read(path)`, or None if the file does not exist.
 
     Raises:
-        UserError: it is truncated or damaged.
+        UserError: it is truncated or damaged, or the system did not let us read it.
     """
-    if not path.exists():
-        return None
     try:
         return read(path)
-    except (ValueError, KeyError, TypeError, OSError) as error:
-        raise UserError(f"checkpoint {path} is unusable ({error}); delete it to restart the cell") from error
-
-
-def _checked_header(path: Path) -> dict[str, Any]:
-    """Return the header that `save_arrays` wrote, after checking every byte of the arrays.
-
-    Raises:
-        FileNotFoundError: the file does not exist.
-        ValueError: it is damaged or another kind of file.
-    """
-    with path.open("rb") as stream:
-        try:
-            size = int.from_bytes(stream.read(8), "little")
-            if size > os.fstat(stream.fileno()).st_size:
-                raise ValueError("its header is longer than the file")
-            layout = json.loads(stream.read(size))
-            header: dict[str, Any] = json.loads(layout.pop("__metadata__")[HEADER])
-            offsets = {name: [8 + size + end for end in layout[name]["data_offsets"]] for name in sorted(layout)}
-            expected = header.pop("checksum")
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise ValueError("damaged or not written by codesign-bench") from error
-        if expected != _checksum((name, _pieces(stream, *ends)) for name, ends in offsets.items()):
-            raise ValueError("damaged: its checksum does not match")
-    return header
-
-
-def _pieces(stream: BinaryIO, start: int, end: int) -> Iterator[bytes]:
-    """Yield the bytes from `start` to `end` of a file in pieces, fewer if the file is shorter."""
-    stream.seek(start)
-    while start < end and (piece := stream.read(min(PIECE, end - start))):
-        start += len(piece)
-        yield piece
-
-
-def _checksum(contents: Iterator[tuple[str, Any]]) -> int:
-    """Return the checksum of arrays, given in alphabetical order as names and pieces of their bytes."""
-    total = 0
-    for name, pieces in contents:
-        total = zlib.crc32(name.encode(), total)
-        for piece in pieces:
-            total = zlib.crc32(piece, total)
-    return total
+    except FileNotFoundError as error:
+        if Path(error.filename) == path:
+            return None
+        raise UserError(f"checkpoint {path} is unusable (no {Path(error.filename).name}); {RESTART}") from error
+    except UnusableFile as error:
+        raise UserError(f"checkpoint {error.path} is unusable ({error.reason})") from error
+    except OSError as error:
+        raise UserError(f"cannot read checkpoint {path} ({reason_of(error)})") from error
+    except DAMAGED_HEADER as error:
+        raise UserError(f"checkpoint {path} is unusable ({error}); {RESTART}") from error
 
 
 def _large_files(path: Path) -> list[Path]:
@@ -216,7 +168,9 @@ def _checksums(archive: zipfile.ZipFile) -> dict[str, int]:
     return {info.filename.removesuffix(".npy"): info.CRC for info in archive.infolist()}
 
 
-def _read_large(path: Path, header: Mapping[str, Any], read: Callable[[BinaryIO], Any]) -> dict[str, Any]:
+def _read_large(
+    path: Path, header: Mapping[str, Any], read: Callable[[zipfile.ZipFile, zipfile.ZipInfo], Any]
+) -> dict[str, Any]:
     """Return name -> `read(array)` for each large array of the checkpoint in `path` with this header.
 
     Raises:
@@ -225,26 +179,46 @@ def _read_large(path: Path, header: Mapping[str, Any], read: Callable[[BinaryIO]
     """
     if header.get("large") is None:
         return {}
-    large, found = path.with_name(header["large"]["file"]), {}
+    large, found = path.with_name(Path(header["large"]["file"]).name), {}
     try:
-        with zipfile.ZipFile(large) as archive:
+        with open_stream(large, LARGE_BYTES) as stream, zipfile.ZipFile(stream) as archive:
             if _checksums(archive) != header["large"]["checksums"]:
                 raise ValueError("its checksums are not those of the checkpoint")
             for info in archive.infolist():
-                with archive.open(info) as member:  # compares the checksum after the last byte
-                    found[info.filename.removesuffix(".npy")] = read(cast(BinaryIO, member))
+                if info.compress_type != zipfile.ZIP_STORED or info.compress_size != info.file_size:
+                    raise ValueError("it is compressed")  # we never do; a small file could fill the memory
+                found[info.filename.removesuffix(".npy")] = read(archive, info)
     except DAMAGED_ZIP as error:
         raise ValueError(f"{large.name} is damaged: {error}") from error
     return found
 
 
-def _load_member(member: BinaryIO) -> Array:
-    array: Array = np.lib.format.read_array(member, allow_pickle=False)
-    if member.read(1):
-        raise ValueError("longer than its array")
+def _load_member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> Array:
+    with archive.open(info) as member:
+        _check_shape(cast(BinaryIO, member), info.file_size)
+    with archive.open(info) as member:  # compares the checksum after the last byte
+        array: Array = np.lib.format.read_array(cast(BinaryIO, member), allow_pickle=False)
+        if member.read(1):
+            raise ValueError("longer than its array")
     return array
 
 
-def _check_member(member: BinaryIO) -> None:
-    while member.read(PIECE):
-        pass
+def _check_shape(member: BinaryIO, size: int) -> None:
+    """Check that an array's header asks for as many bytes as there are, before they are allocated.
+
+    Raises:
+        ValueError: it does not.
+    """
+    versions = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+    version = np.lib.format.read_magic(member)
+    if version not in versions:
+        raise ValueError(f"its version {version} is unknown")
+    shape, _, kind = versions[version](member)
+    if kind.hasobject or member.tell() + math.prod(shape) * kind.itemsize != size:
+        raise ValueError("its shape is not that of its content")
+
+
+def _check_member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> None:
+    with archive.open(info) as member:
+        while member.read(PIECE):
+            pass

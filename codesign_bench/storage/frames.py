@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,13 +11,18 @@ from codesign_bench.cell.axes import axis_named
 from codesign_bench.cell.variant import DEFAULT_NAME, FIRST_AXES, Value, Variant, in_axis_order
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import StoredCell, reported_cells
-from codesign_bench.storage.layout import CURVE_COLUMNS, CURVE_FILE, EVALUATION_FILE
+from codesign_bench.storage.reading import UnusableFile
+from codesign_bench.storage.survey import survey
 
 if TYPE_CHECKING:  # pandas takes a second to import; cell processes do not need it
     import pandas as pd
 
 LABEL_COLUMN = "label"
 """Column with the method's name in figures; the other columns identify the cell."""
+
+
+class LeftOutWarning(UserWarning):
+    """A file of a results folder cannot be used, so rows are missing from a frame."""
 
 
 def load_results(out: str | Path) -> pd.DataFrame:
@@ -27,12 +33,25 @@ def load_results(out: str | Path) -> pd.DataFrame:
     Columns: task, method, variant, one for each axis (cutout, alpha, finetune, scratch, and any other axis of a cell;
     NaN where it is not varied), seed, label, then those of `curve.csv`.
 
+    Files that cannot be used are left out, with a warning that names each and its reason.
+
+    Raises:
+        UserError: the folder does not exist or contains no results.
+    """
+    for problem in survey(Path(out)):
+        warnings.warn(f"left out: {problem}", LeftOutWarning, stacklevel=2)
+    return stored_curves(out)
+
+
+def stored_curves(out: str | Path) -> pd.DataFrame:
+    """Return the frame of `load_results`; its callers say themselves what is left out.
+
     Raises:
         UserError: the folder does not exist or contains no results.
     """
     import pandas as pd
 
-    parts = [(cell, curve) for cell in reported_cells(Path(out)) if (curve := _read_curve(cell)) is not None]
+    parts = _tables_of(reported_cells(Path(out)), StoredCell.curve)
     if not parts:
         raise UserError(f"no results in '{out}' yet; create some with: codesign-bench run --out {out}")
     frame = pd.concat(_with_cell_columns(parts), ignore_index=True)
@@ -51,15 +70,11 @@ def load_evaluations(out: str | Path) -> pd.DataFrame:
     """
     import pandas as pd
 
-    parts = []
-    for cell in reported_cells(Path(out)):
-        if cell.is_done and (cell.folder / EVALUATION_FILE).exists():
-            table = pd.read_csv(cell.folder / EVALUATION_FILE)
-            table.insert(0, "instance", range(len(table)))
-            parts.append((cell, table))
+    parts = _tables_of((cell for cell in reported_cells(Path(out)) if cell.is_done), StoredCell.evaluation)
     if not parts:
         raise UserError(f"no finished cell in '{out}' yet; create some with: codesign-bench run --out {out}")
-    return pd.concat(_with_cell_columns(parts), ignore_index=True).astype({"seed": int})
+    numbered = [(cell, _in_front({"instance": range(len(table))}, table)) for cell, table in parts]
+    return pd.concat(_with_cell_columns(numbered), ignore_index=True).astype({"seed": int})
 
 
 def default_rows(frame: pd.DataFrame) -> pd.DataFrame:
@@ -97,6 +112,7 @@ def require_columns(frame: pd.DataFrame, columns: Sequence[str], what: str) -> N
 def _with_cell_columns(parts: Sequence[tuple[StoredCell, pd.DataFrame]]) -> list[pd.DataFrame]:
     """Insert the columns that identify each cell before its table's columns; all tables get the same axes."""
     axes = in_axis_order({*FIRST_AXES, *(axis for cell, _ in parts for axis, _ in cell.record.variant)})
+    result = []
     for cell, table in parts:
         record = cell.record
         columns = {
@@ -107,9 +123,14 @@ def _with_cell_columns(parts: Sequence[tuple[StoredCell, pd.DataFrame]]) -> list
             "seed": record.seed,
             LABEL_COLUMN: record.label,
         }
-        for position, (name, value) in enumerate(columns.items()):
-            table.insert(position, name, value)
-    return [table for _, table in parts]
+        result.append(_in_front(columns, table))
+    return result
+
+
+def _in_front(columns: Mapping[str, Value | range], table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table with further columns in front, which replace columns of the same names."""
+    kept = table.drop(columns=[name for name in columns if name in table.columns])
+    return kept.assign(**columns)[[*columns, *kept.columns]]
 
 
 def _or_nan(value: Value | None) -> Value:
@@ -118,11 +139,16 @@ def _or_nan(value: Value | None) -> Value:
     return float(value) if isinstance(value, int) else value
 
 
-def _read_curve(cell: StoredCell) -> pd.DataFrame | None:
-    import pandas as pd
-
-    try:
-        curve = pd.read_csv(cell.folder / CURVE_FILE)
-    except (OSError, ValueError):  # not evaluated yet, or not a table
-        return None
-    return None if curve.empty or not set(CURVE_COLUMNS) <= set(curve.columns) else curve
+def _tables_of(
+    cells: Iterable[StoredCell], read: Callable[[StoredCell], pd.DataFrame | None]
+) -> list[tuple[StoredCell, pd.DataFrame]]:
+    """Return the cells whose table can be used, each with its table."""
+    parts = []
+    for cell in cells:
+        try:
+            table = read(cell)
+        except UnusableFile:
+            continue
+        if table is not None:
+            parts.append((cell, table))
+    return parts

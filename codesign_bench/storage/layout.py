@@ -107,9 +107,14 @@ def remove_leftovers(folder: Path) -> None:
 
 def write_rows(path: Path, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> None:
     """Replace the CSV file `path` by `rows`; `columns` come first and are written even without rows."""
+    write_bytes(path, rows_bytes(rows, columns))
+
+
+def rows_bytes(rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> bytes:
+    """Return the content of the CSV file that `write_rows` writes."""
     names = list(dict.fromkeys((*columns, *(name for row in rows for name in row))))
     table = io.StringIO()
     writer = csv.DictWriter(table, names, lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    write_bytes(path, table.getvalue().encode())
+    return table.getvalue().encode()

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from codesign_bench.config.resolve import method_config
 from codesign_bench.errors import ChangedTaskError, UserError
 from codesign_bench.method import Array, Policy, load_method
+from codesign_bench.storage.arrays import load_arrays, save_arrays
 from codesign_bench.storage.cells import StoredCell, open_cell
-from codesign_bench.storage.checkpoint import load_arrays, save_arrays
+from codesign_bench.storage.files import reason_of
 from codesign_bench.storage.layout import POLICY_FILE
+from codesign_bench.storage.reading import DamagedFile, UnreadableFile
+from codesign_bench.storage.records import CELL_FILE
 from codesign_bench.task import Task, load_task
+
+MOST_LAYERS, WIDEST, LARGEST_LAYER = 64, 2**16, 2**26
+"""Limits of the networks in a cell file: number of layers, width of a layer, weights between two."""
 
 
 def save_policy(folder: Path, policy: Policy, header: dict[str, Any]) -> None:
@@ -38,14 +47,16 @@ def policy_of(cell: StoredCell) -> Policy:
     """
     tensors, record, path = policy_tensors(cell), cell.record, cell.folder / POLICY_FILE
     method_class = load_method(record.method)
+    _check_widths(cell)
     config = method_config(method_class.config_class, record.config.method)
     try:
         return method_class.make_policy(load_task(record.task), config, tensors)
     except ChangedTaskError as error:
         again = f"codesign-bench run --task {record.task} --method {record.method}"
         raise ChangedTaskError(f"{path} was {error}; train it again, into another folder: {again}") from error
-    except (KeyError, ValueError, RuntimeError) as error:
-        raise UserError(f"{path} is incompatible with method '{record.method}' of this version: {error}") from error
+    except (KeyError, ValueError, TypeError, IndexError, AttributeError, RuntimeError, MemoryError) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise UserError(f"{path} is incompatible with method '{record.method}' of this version: {reason}") from error
 
 
 def misfit(cell: StoredCell) -> str:
@@ -74,6 +85,19 @@ def policy_and_task(folder: Path, name: str | None) -> tuple[Policy, Task]:
     return policy_of(cell), load_task(trained_on)
 
 
+def _check_widths(cell: StoredCell) -> None:
+    """Check that a cell's settings ask for no network that could not be in a policy's file, before it is allocated.
+
+    Raises:
+        DamagedFile: a list of widths is too long, or its layers are too large.
+    """
+    for name, (value, _) in cell.record.config.method.items():
+        widths = value if isinstance(value, list) and all(type(width) is int for width in value) else []
+        layers = [before * after for before, after in pairwise(widths)]
+        if len(widths) > MOST_LAYERS or max([*widths, 0]) > WIDEST or max([*layers, 0]) > LARGEST_LAYER:
+            raise DamagedFile(cell.folder / CELL_FILE, f"'{name}' asks for a network that no policy has")
+
+
 def policy_tensors(cell: StoredCell) -> dict[str, Array]:
     """Return the tensors of a cell's final policy.
 
@@ -89,9 +113,15 @@ def policy_tensors(cell: StoredCell) -> dict[str, Array]:
         )
     path = cell.folder / POLICY_FILE
     try:
-        return load_arrays(path)[0]
+        tensors = load_arrays(path)[0]
     except FileNotFoundError:
         state = "its policy file is missing" if cell.is_done else f"its status is '{cell.status}'"
         raise UserError(f"'{cell.folder}' has no final policy: {state}") from None
     except ValueError as error:
-        raise UserError(f"cannot load {path}: {error}") from error
+        raise DamagedFile(path, str(error)) from error
+    except OSError as error:
+        raise UnreadableFile(path, reason_of(error)) from error
+    for name, tensor in tensors.items():
+        if (np.isnan(tensor) | np.isposinf(tensor)).any():  # the logarithm of a standard deviation of 0 is -inf
+            raise DamagedFile(path, f"'{name}' has values that are not numbers")
+    return tensors

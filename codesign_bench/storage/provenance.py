@@ -7,6 +7,7 @@ from typing import Any
 
 from codesign_bench.storage.cells import StoredCell
 from codesign_bench.storage.records import CellRecord
+from codesign_bench.text_tables import plain_markdown
 
 NOT_RECORDED = "not recorded"
 SHORT = 12
@@ -56,7 +57,7 @@ def differences(folders: Mapping[str, Sequence[CellRecord]]) -> list[str]:
 def as_markdown(paragraph: Sequence[str]) -> str:
     """Return what `differences` found as Markdown."""
     heading, *lines = paragraph
-    return "\n".join([heading, "", *(f"- {line}" for line in lines)]) + "\n"
+    return "\n".join([heading, "", *(f"- {plain_markdown(line)}" for line in lines)]) + "\n"
 
 
 def same_conditions(one: Conditions, other: Conditions) -> bool:

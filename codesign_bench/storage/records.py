@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, timezone
@@ -12,12 +11,16 @@ from typing import Any
 from codesign_bench.cell.variant import FIRST_AXES, Variant
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.config.settings import StoredConfig
-from codesign_bench.errors import UserError
 from codesign_bench.storage.files import write_json
+from codesign_bench.storage.json_fields import entries, number, optional, text, whole
+from codesign_bench.storage.reading import JSON_BYTES, DamagedFile, NewerFile, parse_json, read_bytes
 
 CELL_FILE = "cell.json"
 SCHEMA = 2
 """Version 1 stored the first four axes of the variant as top-level entries, and no other axes."""
+
+RESTART = "delete its folder to restart the cell"
+"""Said only of a cell file whose content was read and is damaged."""
 
 FORMER_LABELS = {"GNN-PPO (paper's)": "GNN-PPO"}
 """Labels in stored cells that are the same for both credits of the design step -> the method's label since."""
@@ -83,6 +86,8 @@ class CellRecord:
     pid: int | None = None
     timings: Timings = Timings()
     failure: Failure | None = None
+    checksums: Mapping[str, str] = field(default_factory=dict)
+    """SHA-256 of the tables of a finished cell, by name; empty in cells of version 0.1.0."""
 
     @property
     def threads(self) -> int:
@@ -99,16 +104,22 @@ class CellRecord:
         """Return the record in `folder`, or None if there is none.
 
         Raises:
-            UserError: it is damaged or not a cell file.
+            NewerFile: a newer version wrote it.
+            DamagedFile: it is damaged or not a cell file.
+            UnreadableFile: the system did not let us read it.
         """
         path = folder / CELL_FILE
         try:
-            return cls.from_json(json.loads(path.read_text()))
+            content = read_bytes(path, JSON_BYTES)
         except FileNotFoundError:
             return None
-        except (ValueError, KeyError, TypeError, AttributeError, OSError) as error:
+        try:
+            values = parse_json(content)
+            _refuse_newer(path, values)
+            return cls.from_json(values)
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
             reason = f"no {error}" if isinstance(error, KeyError) else str(error)
-            raise UserError(f"cannot read {path} ({reason}); delete its folder to restart the cell") from error
+            raise DamagedFile(path, reason, RESTART) from error
 
     def write(self, folder: Path) -> None:
         """Replace the record in `folder`."""
@@ -139,6 +150,7 @@ class CellRecord:
             "pid": self.pid,
             "timings": asdict(self.timings),
             "failure": None if self.failure is None else asdict(self.failure),
+            "checksums": dict(self.checksums),
         }
 
     @classmethod
@@ -149,30 +161,32 @@ class CellRecord:
             ValueError, KeyError, TypeError, AttributeError: `content` is not a record.
         """
         schema, status = content["schema"], content["status"]
-        if schema not in (1, SCHEMA):
-            raise ValueError(f"schema {schema} is from a newer version; this version reads up to {SCHEMA}")
+        if type(schema) is not int or schema not in (1, SCHEMA):
+            raise ValueError(f"unknown schema {schema!r}")
         if status not in (RUNNING, DONE, FAILED):
             raise ValueError(f"unknown status {status!r}")
-        axes = {name: content.get(name) for name in FIRST_AXES} if schema == 1 else content["axes"]
-        failure = content["failure"]
+        axes = {name: content.get(name) for name in FIRST_AXES} if schema == 1 else entries(content, "axes")
         return cls(
-            task=_text(content, "task"),
-            task_version=int(content.get("task_version", 1)),  # absent from cells of tasks that had not changed yet
-            method=_text(content, "method"),
+            task=text(content, "task"),
+            # absent from cells of tasks that had not changed yet
+            task_version=whole(content, "task_version") if "task_version" in content else 1,
+            method=text(content, "method"),
             variant=Variant.from_json(axes),
-            seed=int(content["seed"]),
-            profile=_text(content, "profile"),
+            seed=whole(content, "seed"),
+            profile=text(content, "profile"),
             label=_label(content),
             status=status,
-            env_steps=int(content["env_steps"]),
-            config=StoredConfig.from_json(content["config"]),
-            versions=dict(content["versions"].items()),
-            code=dict(content.get("code", {}).items()),
-            host=dict(content["host"].items()),
-            earlier=tuple(dict(part.items()) for part in content.get("earlier", ())),
-            pid=content.get("pid"),
-            timings=Timings(**content["timings"]),
-            failure=None if failure is None else Failure(str(failure["message"]), str(failure["traceback"])),
+            env_steps=whole(content, "env_steps"),
+            config=_config(content),
+            versions=_texts_or_none(content, "versions"),
+            **_code_and_host(content),
+            earlier=tuple(_conditions(part) for part in content.get("earlier", ())),
+            pid=optional(whole, content, "pid"),
+            timings=_timings(content),
+            failure=_failure(content),
+            checksums={
+                name: text(content["checksums"], name) for name in optional(entries, content, "checksums") or ()
+            },
         )
 
 
@@ -181,17 +195,63 @@ def now() -> str:
     return datetime.now(timezone.utc).isoformat(timespec="seconds")
 
 
+def _refuse_newer(path: Path, values: Any) -> None:
+    schema = values.get("schema") if isinstance(values, dict) else None
+    if type(schema) is int and schema > SCHEMA:
+        raise NewerFile(path, f"schema {schema} is from a newer version; this version reads up to {SCHEMA}")
+
+
 def _label(content: Mapping[str, Any]) -> str:
     """Return the label, with the credit of the design step where a former label leaves it out."""
-    label = str(content.get("label") or content["method"])
+    label = text(content, "label" if content.get("label") else "method")
     if label not in FORMER_LABELS:
         return label
     credit = content["config"]["method"].get("design_credit", {}).get("value")
     return FORMER_LABELS[label] if credit is None else f"{FORMER_LABELS[label]}, {credit} credit"
 
 
-def _text(content: Mapping[str, Any], name: str) -> str:
-    value = content[name]
-    if not isinstance(value, str):
-        raise TypeError(f"'{name}' is not text")
-    return value
+def _config(content: Mapping[str, Any]) -> StoredConfig:
+    """Return the configuration, whose budget must be a number of steps."""
+    config = StoredConfig.from_json(entries(content, "config"))
+    whole({"steps": config.run["steps"].value}, "steps")
+    return config
+
+
+def _texts_or_none(content: Mapping[str, Any], name: str) -> dict[str, str | None]:
+    own = entries(content, name)
+    return {key: optional(text, own, key) for key in own}
+
+
+def _code_and_host(content: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the entries on code and machine, as arguments of a record."""
+    code, host = optional(entries, content, "code") or {}, entries(content, "host")
+    for name in ("version", "commit", "fingerprint"):
+        optional(text, code, name)
+    for name in ("name", "system", "cpu"):
+        optional(text, host, name)
+    for name in ("threads", "cores"):
+        optional(whole, host, name)
+    sets = host.get("instruction_sets") or []
+    if not isinstance(sets, list) or not all(isinstance(name, str) for name in sets):
+        raise ValueError("'instruction_sets' is not a list of texts")
+    optional(entries, host, "library_settings")
+    return {"code": code, "host": host}
+
+
+def _conditions(part: Any) -> dict[str, Any]:
+    """Return the conditions of an earlier part of a cell."""
+    if not isinstance(part, dict):
+        raise ValueError("'earlier' is not a list of objects")
+    return {**part, "versions": _texts_or_none(part, "versions"), **_code_and_host(part)}
+
+
+def _timings(content: Mapping[str, Any]) -> Timings:
+    own = entries(content, "timings")
+    for name in own:
+        optional(text if name in ("started", "ended") else number, own, name)
+    return Timings(**own)
+
+
+def _failure(content: Mapping[str, Any]) -> Failure | None:
+    own = optional(entries, content, "failure")
+    return None if own is None else Failure(text(own, "message", most=None), text(own, "traceback", most=None))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from codesign_bench.errors import UserError
 from codesign_bench.stats.normalization import Reference
+from codesign_bench.storage.measurements import REFERENCE_POINTS, usable
 from codesign_bench.storage.tables import read_table
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def load_reference_points(results: Path) -> pd.DataFrame:
     Raises:
         UserError: there are none.
     """
-    table = read_table(results / FILE)
+    table = read_table(results / FILE, REFERENCE_POINTS.form)
     if table is None:
         raise UserError(f"no reference points yet; measure them with: codesign-bench reference --results {results}")
     return table
@@ -62,7 +63,7 @@ def with_reference_points(frame: pd.DataFrame, results: Path) -> pd.DataFrame:
     The columns are called `reference_<point>_<quantity>`, NaN for tasks without the point, so that a figure gets cells
     and points in one frame.
     """
-    table = read_table(results / FILE)
+    table = usable(results / FILE, REFERENCE_POINTS)
     if table is None:
         return frame
     columns = {}

@@ -9,6 +9,8 @@ from __future__ import annotations
 import errno
 import os
 
+from codesign_bench.storage.files import reason_of
+
 MOMENTARY = frozenset(
     getattr(errno, name)
     for name in (
@@ -39,5 +41,5 @@ def momentary_cause(error: BaseException) -> int | None:
 
 def in_words(error: OSError) -> str:
     """Return an error and its file in one line."""
-    reason = error.strerror or str(error) or type(error).__name__
-    return f"{reason}: {os.fsdecode(error.filename)}" if isinstance(error.filename, (str, bytes)) else reason
+    where = error.filename
+    return f"{reason_of(error)}: {os.fsdecode(where)}" if isinstance(where, (str, bytes)) else reason_of(error)

@@ -25,6 +25,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.machine import host_facts, package_versions
 from codesign_bench.plugins import import_modules
 from codesign_bench.processes import EXIT_ORPHANED
+from codesign_bench.storage.cells import table_checksums
 from codesign_bench.storage.files import remove_partial_files
 from codesign_bench.storage.layout import remove_leftovers
 from codesign_bench.storage.locks import locked
@@ -132,7 +133,8 @@ def _run_and_record(resolved: ResolvedCell, folder: Path, record: CellRecord) ->
         reached = {} if run is None else {"env_steps": run.progress.env_steps, "timings": run.timings()}
         record.ended(FAILED, failure=Failure(message, traceback.format_exc()), **reached).write(folder)
         return EXIT_FAILED
-    record.ended(DONE, env_steps=run.progress.env_steps, timings=run.timings()).write(folder)
+    reached = {"env_steps": run.progress.env_steps, "timings": run.timings()}
+    record.ended(DONE, checksums=table_checksums(folder), **reached).write(folder)
     with suppress(OSError):  # the cell is done; the next sweep tries again
         remove_leftovers(folder)
     return EXIT_DONE

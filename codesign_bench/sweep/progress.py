@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 from dataclasses import dataclass
@@ -14,8 +13,10 @@ from rich.live import Live
 from rich.table import Table
 
 from codesign_bench.cell.cell import Cell
-from codesign_bench.console import duration, number
+from codesign_bench.console import duration, number, printer
+from codesign_bench.storage.json_fields import number as json_number
 from codesign_bench.storage.layout import PROGRESS_FILE
+from codesign_bench.storage.reading import UnusableFile, read_json
 
 POLL_SECONDS = 1.0
 LINE_SECONDS = 10.0
@@ -64,7 +65,7 @@ class ProgressDisplay:
 
     def say(self, line: str) -> None:
         """Print a line above the live table."""
-        self._console.print(line, markup=False, highlight=False, soft_wrap=True)
+        printer(self._console)(line)
 
     def ended(self, cell: Cell) -> None:
         """Count `cell` as ended."""
@@ -86,9 +87,11 @@ class ProgressDisplay:
 
     def _read(self, cell: Cell) -> dict[str, Any] | None:
         try:
-            found: dict[str, Any] = json.loads((cell.folder(self.out) / PROGRESS_FILE).read_text())
-            return found if found["updated"] >= self._since else None
-        except (OSError, ValueError, KeyError):
+            found = read_json(cell.folder(self.out) / PROGRESS_FILE)
+            for name in ("updated", "env_steps", "steps", "steps_per_second"):
+                json_number(found, name)
+            return dict(found) if found["updated"] >= self._since else None
+        except (OSError, UnusableFile, ValueError, KeyError, TypeError, AttributeError):
             return None
 
     def _poll(self) -> None:

@@ -16,9 +16,11 @@ from codesign_bench.console import Log, printer
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores
 from codesign_bench.registry import IMPORTS_VARIABLE
+from codesign_bench.storage.cells import StoredCell, stored_record
 from codesign_bench.storage.checkpoint import check_checkpoint
 from codesign_bench.storage.layout import CHECKPOINT_FILE, CURVE_FILE, open_folder, sweep_leftovers
 from codesign_bench.storage.locks import HOLDER_FILE, has_locks, is_locked
+from codesign_bench.storage.reading import DamagedFile
 from codesign_bench.storage.records import DONE, FAILED, INTERRUPTED, CellRecord
 from codesign_bench.storage.system_errors import momentary_cause
 from codesign_bench.sweep.backends import Backend, ClusterLost, WorkersDied, make_backend
@@ -64,7 +66,7 @@ def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = 
     records: dict[Cell, CellRecord | None] = {}
     for resolved in cells:
         try:
-            records[resolved.cell] = CellRecord.read(resolved.cell.folder(out))
+            records[resolved.cell] = stored_record(resolved.cell, out)
         except UserError as error:
             _set_aside(plan, resolved.cell, error)
     readable = [resolved for resolved in cells if resolved.cell in records]
@@ -77,7 +79,9 @@ def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = 
 
 def _sort_into(plan: Plan, resolved: ResolvedCell, record: CellRecord | None, out: Path, *, retry_failed: bool) -> None:
     cell = resolved.cell
-    if record is not None and record.status == DONE:
+    if record is not None and record.status == DONE and (problems := _problems(cell, record, out)):
+        plan.unusable[cell] = f"is done, but cannot be used: {problems}"
+    elif record is not None and record.status == DONE:
         plan.done.append(cell)
     elif record is not None and record.failure is not None and not retry_failed:
         plan.failed[cell] = record.failure.message
@@ -93,6 +97,15 @@ def _sort_into(plan: Plan, resolved: ResolvedCell, record: CellRecord | None, ou
 def _set_aside(plan: Plan, cell: Cell, error: UserError) -> None:
     cells = plan.unusable if momentary_cause(error) is None else plan.unreadable
     cells[cell] = str(error)
+
+
+def _problems(cell: Cell, record: CellRecord, out: Path) -> str:
+    """Return which files of a finished cell cannot be used, and why; "" if all can."""
+    problems = StoredCell(cell.folder(out), record).problems
+    told = [f"{problem.path.name}: {problem.reason}" for problem in problems]
+    if problems and all(isinstance(problem, DamagedFile) for problem in problems):
+        told.append("delete its folder to run it again")
+    return "; ".join(told)
 
 
 def split_cores(cores: int, cells: int, threads: int, jobs: int | None) -> tuple[int, str]:

@@ -81,8 +81,9 @@ def _run(job: Job, folder: Path) -> Outcome:
     folder.mkdir(parents=True, exist_ok=True)
     if is_locked(folder):
         return Outcome(job.cell, BUSY)
-    with suppress(OSError):  # nothing depends on it
-        (folder / PROGRESS_FILE).unlink(missing_ok=True)
+    for name in (PROGRESS_FILE, LOG_FILE):  # opening a pipe in their place would wait for a reader
+        with suppress(OSError):  # nothing depends on them
+            (folder / name).unlink(missing_ok=True)
     code = _run_process(job, folder)
     if code == cell_process.EXIT_DONE:
         return Outcome(job.cell, DONE)

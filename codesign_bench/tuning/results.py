@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from codesign_bench.errors import UserError
-from codesign_bench.storage.files import write_json
-from codesign_bench.storage.layout import write_rows
+from codesign_bench.storage.files import json_bytes, write_output
+from codesign_bench.storage.json_fields import text
+from codesign_bench.storage.layout import rows_bytes
+from codesign_bench.storage.reading import UnusableFile, read_json
 from codesign_bench.study.tuning import Tuning
 from codesign_bench.tuning.scores import Score
 
@@ -36,7 +37,7 @@ def write_table(out: Path, tuning: Tuning, scores: Sequence[Score], kept: Sequen
         }
         for found in scores
     ]
-    write_rows(out / TABLE_FILE, rows, COLUMNS)
+    write_output(f"--out {out}", out / TABLE_FILE, rows_bytes(rows, COLUMNS))
 
 
 def spent(scores: Sequence[Score]) -> dict[str, int]:
@@ -75,7 +76,7 @@ def write_winners(
             for winner in winners
         ],
     }
-    write_json(out / WINNERS_FILE, content)
+    write_output(f"--out {out}", out / WINNERS_FILE, json_bytes(content))
 
 
 def read_winners(path: Path) -> dict[tuple[str, str], tuple[str, ...]]:
@@ -85,7 +86,14 @@ def read_winners(path: Path) -> dict[tuple[str, str], tuple[str, ...]]:
         UserError: there is no such file, or it is another one.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        return {(str(entry["task"]), str(entry["method"])): tuple(entry["set"]) for entry in content["winners"]}
+        return dict(map(_winner, read_json(path)["winners"]))
+    except UnusableFile as error:
+        raise UserError(f"cannot read '{path}', which `codesign-bench tune` writes ({error.reason})") from error
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise UserError(f"cannot read '{path}', which `codesign-bench tune` writes ({error})") from error
+
+
+def _winner(entry: Any) -> tuple[tuple[str, str], tuple[str, ...]]:
+    """Return task and method of an entry, and its settings."""
+    overrides = {f"set {number}": override for number, override in enumerate(entry["set"])}
+    return (text(entry, "task"), text(entry, "method")), tuple(text(overrides, place) for place in overrides)

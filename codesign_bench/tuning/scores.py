@@ -45,12 +45,12 @@ def score(setting: Setting, rung: int, cells: Sequence[Cell], out: Path) -> Scor
 
 
 def _ended(folder: Path) -> tuple[int, float]:
-    """Return a cell's environment steps and its final return, NaN if it failed."""
+    """Return a cell's environment steps and its final return, NaN if it failed or its curve cannot be used."""
     record = CellRecord.read(folder)
     if record is None:  # its process died before it could record anything
         return 0, nan
     cell = StoredCell(folder, record)
-    return record.env_steps, cell.last_evaluation()["return_mean"] if cell.is_done else nan
+    return record.env_steps, cell.last_evaluation().get("return_mean", nan) if cell.is_done else nan
 
 
 def best(scores: Sequence[Score], count: int) -> list[Score]:

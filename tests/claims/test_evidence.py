@@ -2,42 +2,36 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 import pytest
 
+from builders import store_table
 from codesign_bench.cell.variant import Variant
 from codesign_bench.claims.evidence import Evidence, load_evidence
 from codesign_bench.claims.finding import InsufficientData
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
+from codesign_bench.storage.measurements import REFERENCE_POINTS
 from codesign_bench.storage.records import FAILED, RUNNING
 from codesign_bench.task import load_task
 from evidence import OTHER, OURS, TASK, curves, finals, make_cell, make_results
 
 
-@pytest.mark.parametrize(
-    ("damage", "told"),
-    [
-        (
-            lambda folder: (folder / "evaluation.csv").write_text("somebody,else\n1,2\n"),
-            "values of 'return' are missing",
-        ),
-        (lambda folder: (folder / "evaluation.csv").write_text('a,b\n1,2,3\n"'), "cannot read a table"),
-        (lambda folder: (folder / "evaluation.csv").write_text(""), "cannot read a table"),
-    ],
-)
-def test_damaged_results_are_refused_in_a_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], damage: Any, told: str
+@pytest.mark.parametrize("content", ["somebody,else\n1,2\n", 'a,b\n1,2,3\n"', ""])
+def test_a_damaged_cell_is_left_out_and_named_and_the_others_are_judged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], content: str
 ) -> None:
     make_results(tmp_path)
-    damage(tmp_path / "push" / "gnn_ppo" / "default" / "seed-01")
-    assert main(["verify", "--results", str(tmp_path), "--out", str(tmp_path / "claims")]) == 2
-    error = capsys.readouterr().err
-    assert told in error
-    assert error.count("\n") == 1
+    (tmp_path / "push" / "gnn_ppo" / "default" / "seed-01" / "evaluation.csv").write_text(content)
+    assert main(["verify", "--results", str(tmp_path), "--out", str(tmp_path / "claims")]) == 0
+    told = "push/gnn_ppo/default/seed-01/evaluation.csv: its checksum does not match"
+    assert capsys.readouterr().err == f"left out: {told}\n"
+    assert json.loads((tmp_path / "claims" / "claims.json").read_text())["left_out"] == [told]
+    assert f"- {told}\n" in (tmp_path / "claims" / "claims.md").read_text()
+    assert load_evidence(tmp_path).evaluations["seed"].value_counts().to_dict() == {0: 4, 1: 2, 2: 4}
 
 
 def test_unfinished_and_failed_cells_do_not_count(tmp_path: Path) -> None:
@@ -50,15 +44,14 @@ def test_unfinished_and_failed_cells_do_not_count(tmp_path: Path) -> None:
 def test_reference_points_are_read_where_there_are_any(tmp_path: Path) -> None:
     make_results(tmp_path)
     assert load_evidence(tmp_path).references.empty
-    row = {"task": ["push"], "task_version": [1], "point": ["idle"], "return_mean": [-1.5], "success_rate": [0.0]}
-    pd.DataFrame(row).to_csv(tmp_path / "reference_points.csv", index=False)
-    assert load_evidence(tmp_path).references.to_dict("list") == row
+    row = {"task": "push", "task_version": 1, "point": "idle", "return_mean": -1.5, "success_rate": 0.0}
+    store_table(tmp_path / "reference_points.csv", REFERENCE_POINTS, row)
+    assert load_evidence(tmp_path).references[list(row)].to_dict("records") == [row]
 
 
 def test_reference_points_of_another_version_of_the_task_are_left_out(tmp_path: Path) -> None:
     make_results(tmp_path)
-    row = {"task": ["push"], "task_version": [2], "point": ["idle"], "return_mean": [-1.5], "success_rate": [0.0]}
-    pd.DataFrame(row).to_csv(tmp_path / "reference_points.csv", index=False)
+    store_table(tmp_path / "reference_points.csv", REFERENCE_POINTS, {"task": "push", "task_version": 2})
     assert load_evidence(tmp_path).references.empty
 
 

@@ -16,3 +16,26 @@ def test_status_tells_why_a_cell_failed(tmp_path: Path, capsys: pytest.CaptureFi
     store_cell(tmp_path, status=FAILED, failure=failure)
     assert main(["status", "--results", str(tmp_path)]) == 0
     assert capsys.readouterr().out.splitlines()[-1].endswith("RuntimeError: the toy broke")
+
+
+def test_status_names_what_cannot_be_used_and_lists_the_rest(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for seed in range(3):
+        store_cell(tmp_path, seed=seed)
+    cells = tmp_path / "push" / "gnn_ppo" / "default"
+    (cells / "seed-01" / "cell.json").write_text("{")
+    (cells / "seed-02" / "curve.csv").unlink()
+    assert main(["status", "--results", str(tmp_path)]) == 0
+    printed = capsys.readouterr()
+    assert printed.out.splitlines()[-1] == "2 cells: 1 damaged, 1 done"
+    assert [line.split(": ")[1] for line in printed.err.splitlines()] == [
+        "push/gnn_ppo/default/seed-01/cell.json",
+        "push/gnn_ppo/default/seed-02/curve.csv",
+    ]
+
+
+def test_errors_of_cells_control_no_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store_cell(tmp_path, status=FAILED, failure=Failure("\x1b[2J", "\x1b]0;mine\x07"))
+    assert main(["status", "--results", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].endswith(r": \x1b]0;mine\x07")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -57,3 +58,15 @@ def test_other_bad_input_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "not writable" in capsys.readouterr().err
     with pytest.raises(UserError, match="nowhere"):
         load_evidence(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize("command", ["status", "verify", "report", "plot"])
+def test_a_folder_whose_name_is_no_text_can_be_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    results = tmp_path / os.fsdecode(b"runs-\xff")
+    make_results(results)
+    out = {"verify": "claims", "report": "report.html", "plot": "figures"}.get(command)
+    arguments = [command, "--results", str(results), *(["--out", str(tmp_path / out)] if out else [])]
+    assert main(arguments) == 0
+    assert capsys.readouterr().err == ""

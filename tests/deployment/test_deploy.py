@@ -43,3 +43,14 @@ def test_trials_are_written_with_their_incidents_and_a_picture_of_each(tmp_path:
         assert film.n_frames > 3  # type: ignore[attr-defined]
     with pytest.raises(UserError, match="--tool 5: there is no such tool; choose from 1 to 4"):
         deploy(task, task.script(), Order(TRIAL, tools=(5,)), tmp_path, told.append)
+
+
+def test_trials_are_written_all_or_none(tmp_path: Path) -> None:
+    task, table = load_task("fetch_cube"), tmp_path / "deployment" / "fetch_cube" / "trials.csv"
+    table.mkdir(parents=True)
+    (tmp_path / "codesign-bench.json").write_text("{}")
+    with pytest.raises(UserError, match=r"trials\.csv is not writable \(it is a folder\)"):
+        deploy(task, task.script(), Order(Conditions(), tools=(4,)), tmp_path, print)
+    assert [path for path in tmp_path.rglob("*") if path.suffix in (".gif", ".json", ".partial")] == [
+        tmp_path / "codesign-bench.json"
+    ]

@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from builders import store_table
 from codesign_bench import load_task
 from codesign_bench.deployment.conditions import Physics
 from codesign_bench.deployment.rollout import Rollout
 from codesign_bench.deployment.tables import load_deployment, protocol_file, row, summarise
 from codesign_bench.errors import UserError
+from codesign_bench.storage.measurements import DEPLOYMENT
 from codesign_bench.task import deployment_of
 from codesign_bench.task.robot import ArmReport
 
@@ -38,11 +40,11 @@ def test_without_trials_the_user_is_told_how_to_make_them(tmp_path: Path) -> Non
 
 def test_each_policy_has_a_table_and_trials_of_the_first_version_are_of_seed_zero(tmp_path: Path) -> None:
     folder = tmp_path / "deployment" / "fetch_cube"
-    folder.mkdir(parents=True)
     assert [protocol_file(seed) for seed in (0, 3)] == ["protocol.csv", "protocol-seed-03.csv"]
-    (folder / protocol_file(0)).write_text("task,success\nfetch_cube,1\n")
+    store_table(folder / protocol_file(0), DEPLOYMENT, {"task": "fetch_cube", "success": 1})
     assert load_deployment(tmp_path)["policy_seed"].tolist() == [0]
-    (folder / protocol_file(3)).write_text("task,success,policy_seed,solved_in_training\nfetch_cube,0,3,1\n")
+    later = {"task": "fetch_cube", "success": 0, "policy_seed": 3, "solved_in_training": 1}
+    store_table(folder / protocol_file(3), DEPLOYMENT, later)
     trials = load_deployment(tmp_path).set_index("policy_seed")
     assert trials["success"].to_dict() == {0: 1, 3: 0}
     assert np.isnan(trials.loc[0, "solved_in_training"])

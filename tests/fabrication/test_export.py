@@ -73,3 +73,15 @@ def test_without_the_extra_the_way_to_it_is_told(tmp_path: Path, monkeypatch: py
     with pytest.raises(UserError, match=r"pip install 'codesign-bench\[export\]'"):
         export(task, task.script(), Order.of(task, instances="0"), tmp_path, print)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_tools_are_written_all_or_none(tmp_path: Path) -> None:
+    task = load_task("push")
+
+    def stop_at_the_second(line: str) -> None:
+        if "instance-002" in line:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        export(task, task.script(), Order.of(task, instances="0,2"), tmp_path, stop_at_the_second)
+    assert list(tmp_path.iterdir()) == []

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from builders import rising, store_cell
 from codesign_bench import registry
 from codesign_bench.errors import UserError
-from codesign_bench.figures.drawing import draw_figures, figure_names, make_folder, possible_drawings, save
+from codesign_bench.figures.drawing import draw_figures, figure_names, possible_drawings, save
 from codesign_bench.figures.source import Request
 from codesign_bench.registry import names
 from codesign_bench.study import Study
@@ -150,9 +150,23 @@ def test_saving_returns_the_paths_with_the_picture_last(add_figure: AddFigure, r
     assert [path.suffix for path in save(drawing, tmp_path)] == [".md", ".csv", ".pdf", ".png"]
 
 
-def test_a_folder_is_made_and_left_empty_or_refused(tmp_path: Path) -> None:
-    make_folder(tmp_path / "new" / "figures")
-    assert list((tmp_path / "new" / "figures").iterdir()) == []
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="file/figures: not writable"):
-        make_folder(tmp_path / "file" / "figures")
+@pytest.mark.parametrize("label", [r"$\frac{1$", r"$\nonsense$", "costs $5 or $6", "x" * 10_000, "\x1b[2J\x00"])
+def test_text_of_results_is_never_a_formula(tmp_path: Path, label: str) -> None:
+    store_cell(tmp_path / "runs", curve=rising(1.0, 2.0), label=label[:500])
+    draw_figures(["learning_curves", "final_results"], tmp_path / "runs", tmp_path / "out", print)
+    assert (tmp_path / "out" / "learning_curves.png").stat().st_size > 0
+
+
+def test_a_figure_that_cannot_be_written_leaves_the_earlier_one_whole(
+    add_figure: AddFigure, results: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    add_figure("mine")
+    draw_figures(["mine"], results, out, print)
+    before = {path.name: path.read_bytes() for path in out.iterdir() if path.suffix != ".pdf"}
+    (out / "mine.pdf").unlink()
+    (out / "mine.pdf").mkdir()
+    add_figure("mine", data=lambda frame: frame.assign(y=3 * frame["x"]))
+    with pytest.raises(UserError, match=r"--out .*: mine\.pdf is not writable \(it is a folder\)"):
+        draw_figures(["mine"], results, out, print)
+    assert {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()} == before

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from builders import rising, store_cell
+from builders import rising, store_cell, store_table
 from codesign_bench.errors import UserError
 from codesign_bench.figures.source import (
     Request,
@@ -19,6 +19,7 @@ from codesign_bench.figures.source import (
     timing,
     trials_on_an_arm,
 )
+from codesign_bench.storage.measurements import DEPLOYMENT, DESIGN_SENSITIVITY, REFERENCE_POINTS
 from codesign_bench.storage.records import RUNNING
 from codesign_bench.storage.reference_points import FILE, reference_points_in
 
@@ -34,7 +35,7 @@ def test_curves_come_with_the_reference_points_that_the_folder_has(tmp_path: Pat
     store_cell(tmp_path, curve=rising(0.0, 1.0))
     pd.testing.assert_frame_equal(curves_with_references(Request(tmp_path)), curves(Request(tmp_path)))
     row = {"task": ["push"], "point": ["script"], "return_mean": [1.5], "success_rate": [0.5]}
-    pd.DataFrame(row).to_csv(tmp_path / FILE, index=False)
+    store_table(tmp_path / FILE, REFERENCE_POINTS, {name: value for name, (value,) in row.items()})
     found = reference_points_in(curves_with_references(Request(tmp_path)))
     assert found.to_dict("list") == row
 
@@ -50,9 +51,7 @@ def test_tasks_are_those_of_the_cells_each_once(tmp_path: Path) -> None:
 
 def test_trials_are_read_from_beside_the_cells(tmp_path: Path) -> None:
     for task in ("lift_cup", "fetch_cube"):
-        path = tmp_path / "deployment" / task / "protocol.csv"
-        path.parent.mkdir(parents=True)
-        pd.DataFrame({"task": [task], "success": [1]}).to_csv(path, index=False)
+        store_table(tmp_path / "deployment" / task / "protocol.csv", DEPLOYMENT, {"task": task})
     assert trials_on_an_arm(Request(tmp_path))["task"].tolist() == ["fetch_cube", "lift_cup"]
 
 
@@ -61,9 +60,7 @@ def test_what_was_measured_is_read_and_nothing_is_measured_for_a_figure_that_nob
     with pytest.raises(UserError, match="measure it with: codesign-bench plot design_sensitivity"):
         design_sensitivity(Request(tmp_path, told.append))
     assert (told, list(tmp_path.iterdir())) == ([], [])
-    path = tmp_path / "design_sensitivity" / "push.csv"
-    path.parent.mkdir()
-    pd.DataFrame({"task": ["push"], "return": [2.0]}).to_csv(path, index=False)
+    store_table(tmp_path / "design_sensitivity" / "push.csv", DESIGN_SENSITIVITY, {"task": "push", "return": 2.0})
     assert design_sensitivity(Request(tmp_path))["return"].tolist() == [2.0]
 
 

@@ -14,7 +14,10 @@ from reports import Reader, config, make_cell
 def test_cells_are_counted_by_status_and_damaged_ones_named(page: str) -> None:
     text = Reader(page).text
     assert "5: 3 done, 1 failed, 1 interrupted" in text
-    assert "reach/gnn_ppo/default/seed-05" in text.split("Not readable")[1].split("every cell")[0]
+    assert (
+        "reach/gnn_ppo/default/seed-05/cell.json: Expecting property name"
+        in text.split("Left out")[1].split("every cell")[0]
+    )
 
 
 def test_a_cell_file_without_the_usual_parts_is_named_as_unreadable(tmp_path: Path) -> None:
@@ -26,7 +29,7 @@ def test_a_cell_file_without_the_usual_parts_is_named_as_unreadable(tmp_path: Pa
         path.write_text(json.dumps({**json.loads(path.read_text()), **damage}))
     cells, damaged = read_cells(tmp_path)
     assert [cell.name[-7:] for cell in cells] == ["seed-00"]
-    assert [name[-7:] for name in damaged] == ["seed-01", "seed-02", "seed-03"]
+    assert [line.split(": ")[0][-17:] for line in damaged] == [f"seed-0{seed}/cell.json" for seed in (1, 2, 3)]
 
 
 def test_cells_of_tuning_are_neither_shown_nor_called_unreadable(tmp_path: Path) -> None:

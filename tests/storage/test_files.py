@@ -3,12 +3,46 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from codesign_bench.storage.files import dump_json, remove_partial_files, replacing, write_bytes, write_json
+from codesign_bench.errors import UserError
+from codesign_bench.storage.files import (
+    Outputs,
+    dump_json,
+    make_folder,
+    remove_partial_files,
+    replacing,
+    write_bytes,
+    write_json,
+    write_output,
+)
+
+BEYOND_A_LIMIT = """
+import resource, sys
+from pathlib import Path
+from codesign_bench.errors import UserError
+from codesign_bench.storage.files import Outputs
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+folder = Path(sys.argv[1])
+try:
+    with Outputs("--out") as outputs:
+        outputs.write(folder / "a.csv", b"new")
+        outputs.write(folder / "b.png", bytes(2000))
+except UserError as error:
+    print(error)
+"""
+"""Writes two files in a process that may write no more than 1,000 bytes into one, as on a full disk."""
+
+
+def partial(folder: Path) -> list[Path]:
+    """Return the files that are not complete."""
+    return [path for path in folder.rglob("*") if path.name.endswith(".partial")]
 
 
 @pytest.mark.parametrize("durable", [True, False])
@@ -44,9 +78,81 @@ def test_an_error_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
     assert [(found.name, found.read_bytes()) for found in tmp_path.iterdir()] == [("curve.csv", b"old")]
 
 
-def test_everybody_may_read_what_was_written(tmp_path: Path) -> None:
-    write_bytes(tmp_path / "curve.csv", b"")
-    assert (tmp_path / "curve.csv").stat().st_mode & 0o777 == 0o644
+@pytest.mark.parametrize(("mask", "mode"), [(0o022, 0o644), (0o002, 0o664), (0o077, 0o600)])
+def test_a_file_has_the_permissions_that_the_umask_leaves(tmp_path: Path, mask: int, mode: int) -> None:
+    before = os.umask(mask)
+    try:
+        write_bytes(tmp_path / "curve.csv", b"")
+        write_output("--out", tmp_path / "figure.png", b"")
+    finally:
+        os.umask(before)
+    assert {path.stat().st_mode & 0o777 for path in tmp_path.iterdir()} == {mode}
+
+
+def test_a_long_name_leaves_room_for_that_of_the_partial_file(tmp_path: Path) -> None:
+    write_bytes(tmp_path / ("x" * 255), b"content")
+    assert (tmp_path / ("x" * 255)).read_bytes() == b"content"
+
+
+def test_files_that_belong_together_appear_together(tmp_path: Path) -> None:
+    write_bytes(tmp_path / "a.csv", b"old")
+    with Outputs("--out") as outputs:
+        outputs.write(tmp_path / "a.csv", b"new")
+        outputs.write(tmp_path / "below" / "b.png", "text")
+        assert (tmp_path / "a.csv").read_bytes() == b"old"
+        assert not (tmp_path / "below" / "b.png").exists()
+    assert (tmp_path / "a.csv").read_bytes() == b"new"
+    assert (tmp_path / "below" / "b.png").read_bytes() == b"text"
+    assert partial(tmp_path) == []
+
+
+def test_after_an_error_none_of_them_appears(tmp_path: Path) -> None:
+    write_bytes(tmp_path / "a.csv", b"old")
+
+    def fail_half_way() -> None:
+        with Outputs("--out") as outputs:
+            outputs.write(tmp_path / "a.csv", b"new")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fail_half_way()
+    assert (tmp_path / "a.csv").read_bytes() == b"old"
+    assert partial(tmp_path) == []
+
+
+def test_a_folder_in_the_place_of_a_file_is_found_before_anything_is_replaced(tmp_path: Path) -> None:
+    write_bytes(tmp_path / "a.csv", b"old")
+    (tmp_path / "b.csv").mkdir()
+
+    def write_both() -> None:
+        with Outputs("--out here") as outputs:
+            outputs.write(tmp_path / "a.csv", b"new")
+            outputs.write(tmp_path / "b.csv", b"new")
+
+    with pytest.raises(UserError, match=r"--out here: b\.csv is not writable \(it is a folder\)"):
+        write_both()
+    assert (tmp_path / "a.csv").read_bytes() == b"old"
+
+
+def test_the_systems_reason_is_in_the_line_and_the_earlier_files_survive(tmp_path: Path) -> None:
+    for name in ("a.csv", "b.png"):
+        write_bytes(tmp_path / name, b"old")
+    done = subprocess.run([sys.executable, "-c", BEYOND_A_LIMIT, tmp_path], capture_output=True, text=True)
+    assert done.stdout == "--out: b.png is not writable (File too large)\n", done.stderr
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"a.csv": b"old", "b.png": b"old"}
+
+
+def test_a_folder_is_made_and_left_empty_or_refused(tmp_path: Path) -> None:
+    make_folder("--out", tmp_path / "new" / "figures")
+    assert list((tmp_path / "new" / "figures").iterdir()) == []
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match=r"--out: not writable \(Not a directory\)"):
+        make_folder("--out", tmp_path / "file" / "figures")
+
+
+def test_bytes_of_a_path_that_are_no_text_can_be_written(tmp_path: Path) -> None:
+    write_output("--out", tmp_path / "page.md", os.fsdecode(b"runs-\xff"))
+    assert (tmp_path / "page.md").read_text() == "runs-\\udcff"
 
 
 def test_what_a_killed_process_left_is_removed_and_nothing_more(tmp_path: Path) -> None:

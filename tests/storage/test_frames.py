@@ -12,7 +12,7 @@ from builders import rising, store_cell, sweep, toy_cells
 from codesign_bench import load_results
 from codesign_bench.cell.variant import Variant
 from codesign_bench.errors import UserError
-from codesign_bench.storage.frames import default_rows, load_evaluations, require_columns, rows_varying
+from codesign_bench.storage.frames import LeftOutWarning, default_rows, load_evaluations, require_columns, rows_varying
 from codesign_bench.storage.layout import CURVE_COLUMNS
 from codesign_bench.storage.records import RUNNING
 
@@ -54,7 +54,11 @@ def test_partial_sweeps_and_foreign_files_do_not_matter(tmp_path: Path) -> None:
     (store_cell(tmp_path, seed=3, curve=rising(1.0)) / "curve.csv").write_text("somebody,else\n1,2\n")
     (store_cell(tmp_path, seed=4, curve=rising(1.0)) / "cell.json").write_text("{")
     (tmp_path / "notes.txt").write_text("mine")
-    assert load_results(str(tmp_path))["seed"].unique().tolist() == [0]
+    with pytest.warns(LeftOutWarning) as told:
+        assert load_results(str(tmp_path))["seed"].unique().tolist() == [0]
+    named = ("seed-02/curve.csv", "seed-03/curve.csv", "seed-04/cell.json")
+    assert all(any(name in str(warning.message) for warning in told) for name in named)
+    assert len(told) == len(named)
 
 
 def test_a_missing_or_empty_folder_is_named(tmp_path: Path) -> None:

@@ -8,8 +8,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from builders import store_table
 from codesign_bench.errors import UserError
 from codesign_bench.stats import Reference
+from codesign_bench.storage.measurements import REFERENCE_POINTS
 from codesign_bench.storage.reference_points import (
     FILE,
     load_reference_points,
@@ -22,8 +24,8 @@ CELLS = pd.DataFrame({"task": ["push", "push", "scoop"], "return_mean": [1.0, 2.
 
 
 def points(task: str, returns: Mapping[str, float]) -> pd.DataFrame:
-    """Return the points of a task; success is a tenth of the return."""
-    rows = [{"point": name, "return_mean": value, "success_rate": value / 10.0} for name, value in returns.items()]
+    """Return the points of a task; success is a tenth of the return's size."""
+    rows = [{"point": name, "return_mean": value, "success_rate": abs(value) / 10.0} for name, value in returns.items()]
     return pd.DataFrame(rows).assign(task=task)
 
 
@@ -41,7 +43,8 @@ def test_a_folder_without_points_says_how_to_measure_them(tmp_path: Path) -> Non
 
 
 def test_points_travel_with_the_rows_of_their_task(tmp_path: Path) -> None:
-    points("push", {"best_known": 3.0, "idle": -1.0, "any_tool": 2.0}).to_csv(tmp_path / FILE, index=False)
+    rows = points("push", {"best_known": 3.0, "idle": -1.0, "any_tool": 2.0}).to_dict("records")
+    store_table(tmp_path / FILE, REFERENCE_POINTS, *rows)
     frame = with_reference_points(CELLS, tmp_path)
     assert frame["return_mean"].tolist() == [1.0, 2.0, 3.0]
     compared = CELLS.assign(task="push")  # has no such columns, as rows of other results
@@ -50,7 +53,7 @@ def test_points_travel_with_the_rows_of_their_task(tmp_path: Path) -> None:
         "task": ["push", "push"],
         "point": ["idle", "best_known"],
         "return_mean": [-1.0, 3.0],
-        "success_rate": [-0.1, 0.3],
+        "success_rate": [0.1, 0.3],
     }
 
 

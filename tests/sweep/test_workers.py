@@ -82,11 +82,10 @@ def test_a_killed_process_is_recorded_as_a_failure(tmp_path: Path) -> None:
     assert (record.status, record.failure.message) == ("failed", outcome.message)
 
 
-def test_a_process_that_ends_before_its_record_is_told_by_its_last_words(tmp_path: Path) -> None:
+def test_a_cell_that_is_refused_before_its_record_is_told_in_a_line(tmp_path: Path) -> None:
     outcome = run(toy_cell(), tmp_path, imported="")
     assert outcome.status == "failed"
-    assert "ended with exit code 1 and recorded nothing" in outcome.message
-    assert "unknown method 'toy_search'" in outcome.message
+    assert outcome.message.startswith("unknown method 'toy_search'; choose from: ")
     assert "unknown method 'toy_search'" in (outcome.cell.folder(tmp_path) / LOG_FILE).read_text()
 
 

@@ -24,7 +24,7 @@ from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.figures.source import Request
 from codesign_bench.method import Problem, load_method
 from codesign_bench.seeding import Streams, generator
-from codesign_bench.storage.tables import read_table, write_table
+from codesign_bench.storage.tables import Content, Form, read_table, write_table
 from codesign_bench.studies.corl2023.learners import CMA_ES_SWEEP, Swept
 from codesign_bench.task import load_task
 
@@ -48,6 +48,11 @@ KEYS: dict[str, Swept] = {
 }
 """Hyperparameter of the method -> values tested in the paper."""
 COLUMNS = ("task", "rung", "budget", *KEYS, "paper_best", "env_steps", "return_mean", "kept")
+
+FORM = Form(
+    {name: Content.TEXT if name == "task" else Content.NUMBER for name in COLUMNS},
+)
+"""Of the table."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +86,7 @@ def sweep_baseline(results: Path, profile: str, log: Log) -> pd.DataFrame:
     import pandas as pd
 
     path = results / FOLDER / f"{TASK}-{profile}.csv"
-    known = read_table(path)
+    known = read_table(path, FORM)
     if known is not None:
         return known
     plan, rows = PLANS.get(profile, PLANS[DEFAULT_PROFILE]), list[dict[str, Any]]()
@@ -118,7 +123,7 @@ def load_sweep(request: Request) -> pd.DataFrame:
         UserError: there is none.
     """
     for profile in reversed(PLANS):
-        table = read_table(request.results / FOLDER / f"{TASK}-{profile}.csv")
+        table = read_table(request.results / FOLDER / f"{TASK}-{profile}.csv", FORM)
         if table is not None:
             return table
     raise UserError(f"no sweep in '{request.results}' yet")

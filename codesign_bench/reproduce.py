@@ -33,6 +33,7 @@ def reproduce(
     console: Console,
     jobs: int | None = None,
     seeds: int | None = None,
+    same_code: bool = False,
 ) -> int:
     """Run the missing cells of `wanted`, measure, plot, verify and report; return 0, or 1 if a cell failed.
 
@@ -44,7 +45,7 @@ def reproduce(
     log(f"reproducing {', '.join(experiments)} of {study.name} with the profile {profile}")
     for cells in stages_of(list(experiments.values()), profile, seeds):
         if cells:
-            code = max(code, run_sweep(resolve_cells(cells), results, console=console, jobs=jobs))
+            code = max(code, run_sweep(resolve_cells(cells), results, console=console, jobs=jobs, same_code=same_code))
     for name, experiment in experiments.items():
         for measure in experiment.measures:
             _attempt(f"measurement of {name}", partial(measure, results, profile, log), log)

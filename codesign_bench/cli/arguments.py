@@ -69,6 +69,15 @@ def add_sweep(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--retry-failed", action="store_true", help="run failed cells again")
 
 
+def add_same_code(parser: argparse.ArgumentParser) -> None:
+    """Add whether cells count that were run with other code of their task or method."""
+    parser.add_argument(
+        "--same-code",
+        action="store_true",
+        help="count and resume cells although the code of their task or method was changed since",
+    )
+
+
 def add_config(parser: argparse.ArgumentParser) -> None:
     """Add what determines a cell's configuration: profile, budget and individual settings."""
     add_profile(parser)

@@ -18,6 +18,7 @@ from codesign_bench.cli.arguments import (
     add_config,
     add_jobs,
     add_out,
+    add_same_code,
     add_sweep,
     check_at_least_one,
     chosen_methods,
@@ -65,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_out(parser, DEFAULT_RESULTS)
     add_sweep(parser)
+    add_same_code(parser)
 
 
 # Modules that import pandas or torch are imported inside functions, so that `list` and `--help` need neither.
@@ -98,6 +100,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         retry_failed=options.retry_failed,
         backend=options.backend,
         scheduler=options.scheduler,
+        same_code=options.same_code,
     )
 
 

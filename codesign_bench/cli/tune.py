@@ -8,7 +8,15 @@ from pathlib import Path
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import add_jobs, add_profile, add_study, add_sweep, check_at_least_one, integer
+from codesign_bench.cli.arguments import (
+    add_jobs,
+    add_profile,
+    add_same_code,
+    add_study,
+    add_sweep,
+    check_at_least_one,
+    integer,
+)
 from codesign_bench.study import load_study
 
 HELP = "search the settings of every method of a study, with the same effort"
@@ -29,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_jobs(parser)
     add_sweep(parser)
+    add_same_code(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -51,4 +60,5 @@ def run(options: argparse.Namespace, console: Console) -> int:
         retry_failed=options.retry_failed,
         backend=options.backend,
         scheduler=options.scheduler,
+        same_code=options.same_code,
     )

@@ -13,6 +13,7 @@ from codesign_bench.cell.variant import FIRST_AXES, Variant
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.config.settings import StoredConfig
 from codesign_bench.errors import UserError
+from codesign_bench.member_code import MemberCode
 from codesign_bench.storage.files import write_json
 
 CELL_FILE = "cell.json"
@@ -76,6 +77,10 @@ class CellRecord:
     """Package -> version, those that decide numbers, Python and the C library; None: not installed."""
     code: Mapping[str, Any] = field(default_factory=dict)
     """Version, commit, whether files differ from it, and their fingerprint; empty in cells of version 0.1.0."""
+    packages: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """Package of another's task or method -> the same of its code; empty in cells of former versions."""
+    members: Mapping[str, MemberCode] = field(default_factory=dict)
+    """"task" and "method" -> their own code; empty in cells of former versions."""
     host: Mapping[str, Any] = field(default_factory=dict)
     """The machine; cells of version 0.1.0 name no instruction sets."""
     earlier: tuple[Mapping[str, Any], ...] = ()
@@ -92,7 +97,13 @@ class CellRecord:
     @property
     def conditions(self) -> dict[str, Any]:
         """What numbers depend on in addition to the configuration, as JSON values."""
-        return {"code": dict(self.code), "versions": dict(self.versions), "host": dict(self.host)}
+        return {
+            "code": dict(self.code),
+            "packages": {name: dict(code) for name, code in self.packages.items()},
+            "members": {kind: code.to_json() for kind, code in self.members.items()},
+            "versions": dict(self.versions),
+            "host": dict(self.host),
+        }
 
     @classmethod
     def read(cls, folder: Path) -> CellRecord | None:
@@ -168,6 +179,8 @@ class CellRecord:
             config=StoredConfig.from_json(content["config"]),
             versions=dict(content["versions"].items()),
             code=dict(content.get("code", {}).items()),
+            packages={name: dict(code.items()) for name, code in content.get("packages", {}).items()},
+            members={kind: MemberCode.from_json(code) for kind, code in content.get("members", {}).items()},
             host=dict(content["host"].items()),
             earlier=tuple(dict(part.items()) for part in content.get("earlier", ())),
             pid=content.get("pid"),

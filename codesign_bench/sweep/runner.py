@@ -21,6 +21,7 @@ from codesign_bench.storage.layout import CHECKPOINT_FILE, CURVE_FILE, is_locked
 from codesign_bench.storage.records import DONE, FAILED, CellRecord
 from codesign_bench.sweep.backends import Backend, WorkersDied, make_backend
 from codesign_bench.sweep.progress import ProgressDisplay
+from codesign_bench.sweep.stale import StoredWith, code_notes, pretrained, refuse_other_code
 from codesign_bench.sweep.workers import BUSY, Job, Outcome
 
 EXIT_ALL_DONE, EXIT_SOME_FAILED = 0, 1
@@ -37,18 +38,25 @@ class Plan:
     failed: dict[Cell, str]
     """Cells that failed earlier and are not retried, with their error messages."""
     pending: list[ResolvedCell]
+    notes: list[str]
+    """How the code differs from that of stored cells, one line each."""
 
 
-def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = False) -> Plan:
+def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = False, same_code: bool = False) -> Plan:
     """Sort `cells` into done, failed and pending ones in `out`, before anything runs.
 
     Raises:
-        UserError: a stored cell has another configuration, or a cell file or checkpoint is damaged.
+        UserError: a stored cell has another configuration, was run with other code of its task or method (unless
+            `same_code` says that this makes no difference), or a cell file or checkpoint is damaged.
     """
-    plan = Plan([], {}, [])
+    plan = Plan([], {}, [], [])
     records = {resolved.cell: CellRecord.read(resolved.cell.folder(out)) for resolved in cells}
     _refuse_other_configurations(cells, records, out)
     _refuse_without_pretrained([resolved.cell for resolved in cells], out)
+    stored = [StoredWith(resolved, record) for resolved in cells if (record := records[resolved.cell]) is not None]
+    if not same_code:
+        refuse_other_code([*stored, *pretrained(cells, out)], out)
+    plan.notes.extend(code_notes(stored, retry_failed=retry_failed))
     for resolved in cells:
         cell = resolved.cell
         record = records[cell]
@@ -91,6 +99,7 @@ def run_sweep(
     retry_failed: bool = False,
     backend: str = "loky",
     scheduler: str | None = None,
+    same_code: bool = False,
 ) -> int:
     """Run every cell that is not done in `out`; return 0 if all are done at the end, 1 if some failed.
 
@@ -99,17 +108,19 @@ def run_sweep(
         KeyboardInterrupt: the user stopped the sweep; its processes have ended, and the same call resumes it.
     """
     open_folder(out)
-    plan = make_plan(cells, out, retry_failed=retry_failed)
+    plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code)
     threads = max((resolved.config.run.threads for resolved in cells), default=1)
     used_jobs, split = split_cores(available_cores(), len(plan.pending), threads, jobs)
     chosen = make_backend(backend, used_jobs, scheduler)
     say = printer(console)
     say(f"{len(cells)} cells, {len(plan.done)} of them already done; results in {out}")
+    for note in plan.notes:
+        say(note)
     failures = dict(plan.failed)
     if plan.pending:
         say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
         imported = os.environ.get(IMPORTS_VARIABLE, "")
-        queue = [Job(resolved.cell, str(out), retry_failed, imported) for resolved in plan.pending]
+        queue = [Job(resolved.cell, str(out), retry_failed, imported, same_code) for resolved in plan.pending]
         budgets = {resolved.cell: resolved.config.run.steps for resolved in plan.pending}
         with chosen as workers, ProgressDisplay(console, out, budgets) as display:
             failures |= _run_queue(queue, workers, display)

@@ -67,6 +67,7 @@ def tune(
     retry_failed: bool = False,
     backend: str = "loky",
     scheduler: str | None = None,
+    same_code: bool = False,
 ) -> int:
     """Run the missing cells of the search and write its files; return 0, or 1 if some cell failed.
 
@@ -86,6 +87,7 @@ def tune(
         retry_failed=retry_failed,
         backend=backend,
         scheduler=scheduler,
+        same_code=same_code,
     )
     alive = [
         setting

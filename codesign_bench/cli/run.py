@@ -26,6 +26,7 @@ from codesign_bench.cli.arguments import (
     integer,
 )
 from codesign_bench.config.run_settings import DEVICES, PRECISIONS
+from codesign_bench.console import printer
 from codesign_bench.errors import UserError
 
 if TYPE_CHECKING:
@@ -79,9 +80,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.sweep.runner import run_sweep
 
     check_at_least_one(options, "steps", "jobs")
+    log = printer(console)
     cells = grid(
-        tasks=chosen_tasks(options.task),
-        methods=chosen_methods(options.method),
+        tasks=chosen_tasks(options.task, log),
+        methods=chosen_methods(options.method, log),
         seeds=parse_seeds(options.seeds),
         variants=variants_of(axis_values(options)),
         profile=options.profile,

@@ -11,10 +11,12 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 from codesign_bench.cell.variant import DEFAULT
+from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
+from codesign_bench.registry import in_order
 from codesign_bench.storage.cells import StoredCell, reported_cells
 from codesign_bench.storage.policies import misfit, policy_of
-from codesign_bench.task import load_task
+from codesign_bench.task import load_task, usable_tasks
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.play import designed
 
@@ -25,12 +27,13 @@ CALLS = 200
 """Number of timed calls of a policy, with one observation each."""
 
 
-def timing_frame(results: Path) -> pd.DataFrame:
+def timing_frame(results: Path, log: Log = silent) -> pd.DataFrame:
     """Return one row per finished cell of the default variant below `results`.
 
     Columns: task, method, label, seed, profile, env_steps, train_s (without evaluation), cores (of the
     cell), cpu, inference_s (median time of one control step's policy call; one seed per task and method is timed, NaN
-    elsewhere and where there is no policy that fits the task's observation).
+    elsewhere and where there is no policy that fits the task's observation). `log` names tasks that cannot be played in
+    this Python.
 
     Raises:
         UserError: there is no such cell.
@@ -38,13 +41,14 @@ def timing_frame(results: Path) -> pd.DataFrame:
     import pandas as pd
 
     rows = []
+    playable = usable_tasks(in_order("tasks", {cell.record.task for cell in reported_cells(results)}), log)
     timed: set[tuple[str, str]] = set()
     for cell in reported_cells(results):
         record = cell.record
         if not cell.is_done or record.variant != DEFAULT:
             continue
         pair = (record.task, record.method)
-        is_timed = pair not in timed and cell.has_policy and not misfit(cell)
+        is_timed = record.task in playable and pair not in timed and cell.has_policy and not misfit(cell)
         if is_timed:
             timed.add(pair)
         rows.append(

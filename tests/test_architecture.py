@@ -67,6 +67,7 @@ OF_NO_MODULE = {
     "tests/test_architecture.py": "of the code as a whole",
     "tests/test_packaging.py": "of the package as it installs",
     "tests/test_portable.py": "of the settings under which `make test-portable` runs",
+    "tests/test_without_pybullet.py": "of the whole program, in a Python that lacks a package",
     "tests/test_third_party.py": "of the whole program, with members of another package",
 }
 """Test files that belong to no single module -> what they are tests of."""

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING
 from codesign_bench.cell.variant import DEFAULT
 from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
-from codesign_bench.registry import in_order
 from codesign_bench.storage.cells import StoredCell, reported_cells
 from codesign_bench.storage.policies import misfit, policy_of
-from codesign_bench.task import load_task, usable_tasks
+from codesign_bench.task import load_task, task_names, usable_tasks
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.play import designed
 
@@ -41,7 +40,8 @@ def timing_frame(results: Path, log: Log = silent) -> pd.DataFrame:
     import pandas as pd
 
     rows = []
-    playable = usable_tasks(in_order("tasks", {cell.record.task for cell in reported_cells(results)}), log)
+    present = {cell.record.task for cell in reported_cells(results)}
+    playable = usable_tasks([name for name in task_names() if name in present], log)
     timed: set[tuple[str, str]] = set()
     for cell in reported_cells(results):
         record = cell.record

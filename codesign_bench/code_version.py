@@ -13,7 +13,7 @@ from typing import Any
 import codesign_bench
 
 PACKAGES = ("codesign_bench", "codesign_bench.methods", "codesign_bench.tasks")
-"""What decides numbers; figures only draw them. Members of other packages are not covered."""
+"""What decides numbers; figures only draw them. `member_code` covers members of other packages."""
 SHORT = 12
 """Digits of a commit or a fingerprint that messages show."""
 GIT_SECONDS = 10.0
@@ -45,7 +45,7 @@ class CodeVersion:
 def code_version(folders: Sequence[Path] | None = None) -> CodeVersion:
     """Return the version of the code in `folders`, the package's own folder first; by default of the code that runs."""
     folders = _own_folders() if folders is None else list(folders)
-    commit, changed = _commit(folders)
+    commit, changed = checked_out(folders[0] / "__init__.py", folders, ".py")
     return CodeVersion(codesign_bench.__version__, commit, changed, fingerprint(folders))
 
 
@@ -72,16 +72,19 @@ def _own_folders() -> list[Path]:
     return [Path(place) for spec in specs if spec is not None for place in spec.submodule_search_locations or ()]
 
 
-def _commit(folders: Sequence[Path]) -> tuple[str | None, bool | None]:
-    """Return the commit that is checked out, and whether a Python file below `folders` differs from it."""
-    package = folders[0]
+def checked_out(tracked: Path, paths: Sequence[Path], suffix: str = "") -> tuple[str | None, bool | None]:
+    """Return the commit that is checked out, and whether a file below `paths` whose name ends in `suffix` differs.
+
+    Both are None if `tracked`, a file of the code, is in no git checkout, or git cannot be asked.
+    """
     try:
-        _git(package, "ls-files", "--error-unmatch", "__init__.py")  # else the checkout is another project's
-        commit = _git(package, "rev-parse", "HEAD")
-        changes = _git(package, "status", "--porcelain", "--untracked-files=all", "--", *map(str, folders))
+        _git(tracked.parent, "ls-files", "--error-unmatch", tracked.name)  # else the checkout is another project's
+        commit = _git(tracked.parent, "rev-parse", "HEAD")
+        listed = ("status", "--porcelain", "--untracked-files=all", "--", *map(str, paths))
+        changes = _git(tracked.parent, *listed)
     except (OSError, subprocess.SubprocessError):
         return None, None
-    return commit, any(line.rstrip('"').endswith(".py") for line in changes.splitlines())
+    return commit, any(line.rstrip('"').endswith(suffix) for line in changes.splitlines())
 
 
 def _git(folder: Path, *arguments: str) -> str:

@@ -7,7 +7,7 @@ import inspect
 import os
 from types import ModuleType
 
-from codesign_bench.errors import UserError
+from codesign_bench.errors import UnavailableError, UserError
 from codesign_bench.method import Method
 from codesign_bench.registry import IMPORTS_VARIABLE, register
 from codesign_bench.study import Study
@@ -22,6 +22,7 @@ def import_modules(modules: list[str]) -> None:
 
     Raises:
         UserError: a module cannot be found.
+        UnavailableError: a module imports a package that is not installed.
     """
     known = [name for name in os.environ.get(IMPORTS_VARIABLE, "").split(",") if name]
     for name in known + [name for name in modules if name not in known]:
@@ -29,7 +30,7 @@ def import_modules(modules: list[str]) -> None:
             module = importlib.import_module(name)
         except ModuleNotFoundError as error:
             if error.name is None or not name.startswith(error.name):
-                raise
+                raise UnavailableError(f"it needs {error.name}, which is not installed", f"--import {name}") from error
             raise UserError(f"--import: no module named '{name}'") from error
         _register_members(module)
     os.environ[IMPORTS_VARIABLE] = ",".join(dict.fromkeys(known + modules))

@@ -9,12 +9,12 @@ import importlib
 import inspect
 import pkgutil
 from collections.abc import Callable, Iterable
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
 from typing import Any
 
-from codesign_bench.errors import unknown_name
+from codesign_bench.errors import UnavailableError, unknown_name
 
 IMPORTS_VARIABLE = "CODESIGN_BENCH_IMPORTS"
 """Environment variable through which `--import module` reaches the worker processes (module names, comma-separated)."""
@@ -56,16 +56,31 @@ def load(group: str, name: str, base: type) -> Any:
 
     Raises:
         UserError: no entry has this name.
+        UnavailableError: it cannot be imported in this Python.
         TypeError: its file does not define exactly one public subclass of `base`.
     """
-    if name in _files(group):
-        return single_subclass(importlib.import_module(f"codesign_bench.{group}.{name}"), base)
-    if name in _entry_points(group):
-        loaded = _entry_points(group)[name].load()
-        return single_subclass(loaded, base) if isinstance(loaded, ModuleType) else loaded
-    if name in _registered.get(group, {}):
-        return _registered[group][name]()
-    raise unknown_name(KINDS[group], name, names(group))
+    found = _entry(group, name)
+    return single_subclass(found, base) if isinstance(found, ModuleType) else found
+
+
+def usable(given: Iterable[str], load_one: Callable[[str], object], log: Callable[[str], None]) -> list[str]:
+    """Return those of the given names that `load_one` can load in this Python; log the others, a line per reason."""
+    left_out: dict[str, list[str]] = {}
+    found = []
+    for name in given:
+        try:
+            load_one(name)
+            found.append(name)
+        except UnavailableError as error:
+            left_out.setdefault(error.reason, []).append(name)
+    for reason, left in left_out.items():
+        log(f"left out: {', '.join(left)}: {reason}")
+    return found
+
+
+def usable_modules(group: str, log: Callable[[str], None] = lambda line: None) -> list[str]:
+    """Return the names in `group`, figures or studies, that can be imported; log the others, a line per reason."""
+    return usable(names(group), partial(load_module, group), log)
 
 
 def load_module(group: str, name: str) -> ModuleType:
@@ -73,16 +88,10 @@ def load_module(group: str, name: str) -> ModuleType:
 
     Raises:
         UserError: no entry has this name.
+        UnavailableError: it cannot be imported in this Python.
         TypeError: the entry is not a module.
     """
-    if name in _files(group):
-        return importlib.import_module(f"codesign_bench.{group}.{name}")
-    if name in _entry_points(group):
-        found = _entry_points(group)[name].load()
-    elif name in _registered.get(group, {}):
-        found = _registered[group][name]()
-    else:
-        raise unknown_name(KINDS[group], name, names(group))
+    found = _entry(group, name)
     if not isinstance(found, ModuleType):
         raise TypeError(f"the {KINDS[group]} '{name}' must be a module, not {type(found).__name__}")
     return found
@@ -115,6 +124,33 @@ def single_subclass(module: ModuleType, base: type) -> Any:
     if len(found) != 1:
         raise TypeError(f"{module.__name__} must define one public {base.__name__}, not {len(found)}")
     return found[0]
+
+
+def _entry(group: str, name: str) -> Any:
+    """Return what the entry `name` of `group` names: a module, a class, or whatever an entry point names."""
+    if name in _files(group):
+        load: Callable[[], Any] = partial(importlib.import_module, f"codesign_bench.{group}.{name}")
+    elif name in _entry_points(group):
+        load = _entry_points(group)[name].load
+    elif name in _registered.get(group, {}):
+        load = _registered[group][name]
+    else:
+        raise unknown_name(KINDS[group], name, names(group))
+    try:
+        return load()
+    except UnavailableError as error:
+        raise UnavailableError(error.reason, f"{KINDS[group]} '{name}'") from error
+    except ImportError as error:
+        if (error.name or "").partition(".")[0] == "codesign_bench" and name in _files(group):
+            raise  # a fault of our own
+        raise UnavailableError(_reason(error), f"{KINDS[group]} '{name}'") from error
+
+
+def _reason(error: ImportError) -> str:
+    """Return in one line why an import failed."""
+    if isinstance(error, ModuleNotFoundError) and error.name:
+        return f"it needs {error.name.partition('.')[0]}, which is not installed"
+    return " ".join(str(error).split())
 
 
 @lru_cache

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from codesign_bench.cell.cell import resolve_cells
+from codesign_bench.cell.cell import resolve_cells, usable_cells
 from codesign_bench.claims.verify import verify
 from codesign_bench.console import Log, printer, tell_left_out
 from codesign_bench.errors import UserError
@@ -34,6 +34,7 @@ def reproduce(
     console: Console,
     jobs: int | None = None,
     seeds: int | None = None,
+    same_code: bool = False,
 ) -> int:
     """Run the missing cells of `wanted`, measure, plot, verify and report; return 0, or 1 if a cell failed.
 
@@ -43,9 +44,11 @@ def reproduce(
     experiments, log = study.experiments_named(wanted), printer(console)
     code = EXIT_ALL_DONE
     log(f"reproducing {', '.join(experiments)} of {study.name} with the profile {profile}")
-    for cells in stages_of(list(experiments.values()), profile, seeds):
-        if cells:
-            code = max(code, run_sweep(resolve_cells(cells), results, console=console, jobs=jobs))
+    stages = stages_of(list(experiments.values()), profile, seeds)
+    usable = set(usable_cells((cell for cells in stages for cell in cells), log))
+    for stage in stages:
+        if cells := [cell for cell in stage if cell in usable]:
+            code = max(code, run_sweep(resolve_cells(cells), results, console=console, jobs=jobs, same_code=same_code))
     for name, experiment in experiments.items():
         for measure in experiment.measures:
             _attempt(f"measurement of {name}", partial(measure, results, profile, log), log)

@@ -12,14 +12,16 @@ from typing import Annotated
 
 import numpy as np
 
-from codesign_bench.errors import UserError
+from codesign_bench.errors import UnavailableError
 from codesign_bench.task import OURS, Given, constants
 from codesign_bench.task.robot import ArmReport
 
 try:
     import pybullet as pybullet
 except ModuleNotFoundError as error:
-    raise UserError("3D tasks need pybullet (it has wheels for Python 3.10 and 3.11): pip install pybullet") from error
+    raise UnavailableError(
+        "3D tasks need pybullet, which is not installed (it has wheels for Python 3.10 and 3.11): pip install pybullet"
+    ) from error
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 """The identity rotation."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 import numpy as np
-import pybullet
 
 from codesign_bench.task import (
     OURS,
@@ -45,6 +44,7 @@ from ._bullet import (
     rotation_matrices,
     rotations_about,
 )
+from ._carriers import pybullet
 from ._scene import COLOURS, Clock
 
 PAPER = "paper, table of 3D scoop"

@@ -90,6 +90,13 @@ def store_table(path: Path, kind: Measurements, *rows: Mapping[str, Any]) -> Pat
     return path
 
 
+def write_files(folder: Path, files: Mapping[str, str]) -> None:
+    """Write text files below a folder, given by their paths in it."""
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+
+
 def rising(*returns: float, every: int = 100) -> list[dict[str, Any]]:
     """Return rows of a curve that goes through `returns`, one evaluation every so many environment steps."""
     return [{"env_steps": every * index, "return_mean": value} for index, value in enumerate(returns)]

@@ -27,6 +27,9 @@ MEMBERS = {"methods": "methods", "tasks": "tasks", "paper_figs": "paper_figs", "
 
 EVERY_METHOD = "tests/methods/test_contract.py and tests/methods/test_honesty.py ask every method"
 PRINTED = "numbers that the paper prints"
+DATA = (".j2", ".css")
+"""Endings of files that are installed beside the code."""
+
 TESTED_ELSEWHERE = {
     "codesign_bench/learning/ppo_method.py": f"an abstract class; {EVERY_METHOD}, most of which extend it",
     "codesign_bench/studies/corl2023/learners.py": f"{PRINTED}; tests/studies/corl2023/test_tables.py",
@@ -69,6 +72,7 @@ OF_NO_MODULE = {
     "tests/test_hostile_files.py": "of every command, on results folders with damaged files",
     "tests/test_packaging.py": "of the package as it installs",
     "tests/test_portable.py": "of the settings under which `make test-portable` runs",
+    "tests/test_without_pybullet.py": "of the whole program, in a Python that lacks a package",
     "tests/test_third_party.py": "of the whole program, with members of another package",
 }
 """Test files that belong to no single module -> what they are tests of."""
@@ -159,7 +163,8 @@ def test_the_listed_packages_are_the_folders_on_disk() -> None:
     setup.read(ROOT / "setup.cfg")
     listed = set(setup["options"]["packages"].split())
     on_disk = {package_of(path) for path in (*CORE, *(path for folder in FLAT_FOLDERS for path in files(folder)))}
-    assert listed == on_disk
+    of_data = {package_of(path) for path in (ROOT / "codesign_bench").rglob("*") if path.suffix in DATA}
+    assert listed == on_disk | of_data
     mapped = dict(line.split(" = ") for line in setup["options"]["package_dir"].strip().splitlines())
     assert mapped == {f"codesign_bench.{folder}": folder for folder in FLAT_FOLDERS}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.y*ml"))
+SCRIPTS = sorted((ROOT / ".ci").iterdir())
 LEFT_OUT = shutil.ignore_patterns(".*", "*.egg-info", "build", "dist", "__pycache__", "results")
 
 
@@ -72,6 +75,37 @@ def test_the_command_works_outside_the_checkout(installed: Path, tmp_path: Path)
     for folder in ("methods", "tasks", "paper_figs"):
         for name in (path.stem for path in (ROOT / folder).glob("[a-z]*.py")):
             assert name in listing
+
+
+def test_the_build_has_no_warning_of_a_folder_that_is_not_declared(checkout: Path, tmp_path: Path) -> None:
+    build = "import setuptools.build_meta as backend, sys; backend.build_wheel(sys.argv[1])"
+    command = [sys.executable, "-c", build, str(tmp_path)]
+    done = subprocess.run(command, cwd=checkout, capture_output=True, text=True, timeout=300, check=True)
+    said = done.stdout + done.stderr
+    assert "page.html.j2" in said, "the build tells nothing: the test shows nothing"
+    assert "absent from the" not in said
+    assert "eprecat" not in said
+
+
+ACTION = re.compile(r"- uses: [\w./-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+")
+
+
+@pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.name)
+def test_a_workflow_may_only_read_and_pins_its_actions_by_commit(workflow: Path) -> None:
+    lines = workflow.read_text().splitlines()
+    top = lines.index("permissions:")
+    assert lines[top + 1 : top + 3] == ["  contents: read", ""]
+    assert [line for line in lines if "permissions:" in line or "write" in line] == ["permissions:"]
+    used = [line.strip() for line in lines if "uses:" in line]
+    assert used
+    assert [line for line in used if not ACTION.fullmatch(line)] == []
+    assert sum("persist-credentials: false" in line for line in lines) == sum("checkout@" in line for line in used)
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
+def test_what_a_workflow_runs_exists_and_may_be_run(script: Path) -> None:
+    assert os.access(script, os.X_OK)
+    assert any(f".ci/{script.name}" in workflow.read_text() for workflow in WORKFLOWS)
 
 
 @pytest.mark.slow

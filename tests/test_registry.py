@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from types import ModuleType
 
 import pytest
 
+from builders import write_files
 from codesign_bench import registry
-from codesign_bench.errors import UserError
-from codesign_bench.task import Task
+from codesign_bench.cell.axes import axes
+from codesign_bench.config.profiles import profiles
+from codesign_bench.errors import UnavailableError, UserError
+from codesign_bench.figures.drawing import figure_names
+from codesign_bench.task import Task, usable_tasks
 
 pytestmark = pytest.mark.usefixtures("toy")
 
@@ -82,3 +88,43 @@ def test_a_file_has_one_public_class_of_its_kind() -> None:
         registry.single_subclass(module_with(_Help=private), Base)
     with pytest.raises(TypeError, match="made_here must define one public Base, not 2"):
         registry.single_subclass(module_with(Mine=public, Other=type("Other", (Base,), {})), Base)
+
+
+def entries(modules: Path, text: str) -> None:
+    """Install a package whose entry points are `text`."""
+    about = {"METADATA": "Metadata-Version: 2.1\nName: needy\nVersion: 1.0\n", "entry_points.txt": text}
+    write_files(modules / "needy-1.0.dist-info", about)
+
+
+def test_members_that_cannot_be_imported_are_left_out_with_one_line_for_each_reason(modules: Path) -> None:
+    entries(modules, "[codesign_bench.tasks]\nfirst = needy.one\nsecond = needy.two\nthird = needy.three\n")
+    needs = "import package_that_nobody_has.part\n"
+    write_files(modules / "needy", {"__init__.py": "", "one.py": needs, "two.py": needs})
+    told: list[str] = []
+    assert usable_tasks(["first", "push", "second", "third"], told.append) == ["push"]
+    assert told == [
+        "left out: first, second: it needs package_that_nobody_has, which is not installed",
+        "left out: third: it needs needy, which is not installed",
+    ]
+    with pytest.raises(UnavailableError, match="task 'first' is not available: it needs package_that_nobody_has"):
+        registry.load("tasks", "first", Task)
+
+
+def test_a_figure_and_a_study_that_cannot_be_imported_keep_no_other_from_use(modules: Path) -> None:
+    entries(modules, "[codesign_bench.paper_figs]\nmine = needy.fig\n[codesign_bench.studies]\nours = needy.study\n")
+    write_files(
+        modules / "needy",
+        {"__init__.py": "", "fig.py": "from numpy import nothing_of_this_name\n", "study.py": "import x_y_z\n"},
+    )
+    told: list[str] = []
+    assert "mine" not in figure_names(None, told.append)
+    assert len(told) == 1
+    assert told[0].startswith("left out: mine: cannot import name 'nothing_of_this_name' from 'numpy'")
+    assert "alpha" in axes()
+    assert "paper" in profiles()
+
+
+def test_a_fault_in_our_own_files_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "codesign_bench.tasks.push", None)
+    with pytest.raises(ModuleNotFoundError):
+        registry.load("tasks", "push", Task)

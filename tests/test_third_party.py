@@ -207,3 +207,30 @@ def test_its_members_keep_every_promise_that_is_tested_of_members(installed: Pat
 
 def test_everything_that_lists_members_holds_with_it(installed: Path) -> None:
     suite("-q", *(str(TESTS / name) for name in LISTINGS), path=installed)
+
+
+def test_changed_code_of_a_package_is_told_and_changed_own_code_of_a_member_refused(tmp_path: Path) -> None:
+    shutil.copytree(EXAMPLE, tmp_path / "package", ignore=shutil.ignore_patterns("__pycache__"))
+    package, out = tmp_path / "package" / "reach_example", tmp_path / "runs"
+    small = ("--task", "reach", "--method", "random_search", "--steps", "600", "--set", "evaluations=1")
+    again = ("run", *IMPORTS, *small, "--out", str(out))
+
+    def edit(name: str, text: str) -> str:
+        with open(package / name, "a") as file:
+            file.write(text)
+        return command(*again, path=package.parent)[0]
+
+    command(*again, path=package.parent)
+    assert "other code" not in edit("../README.md", "A word.")
+    own = edit("reach.py", "\n# A comment.\n")
+    assert "1 of them already done" in own
+    assert "1 stored cell with other code of reach_example: " in own
+    assert "1 stored cell with other code of reach_example: " in edit("tool_lengths.py", "\nNUMBER = 1\n")
+    before = (cell(out, "random_search") / "cell.json").read_bytes()
+    with open(package / "reach.py", "a") as file:
+        file.write("\nNUMBER = 1\n")
+    told = command(*again, path=package.parent, status=2)[1]
+    assert "was run with other code of task 'reach' (reach_example.reach)" in told
+    assert len(told.splitlines()) == 2
+    assert (cell(out, "random_search") / "cell.json").read_bytes() == before
+    assert "all 1 cells done" in command(*again, "--same-code", path=package.parent)[0]

@@ -29,7 +29,7 @@ from codesign_bench.config.resolve import resolve
 from codesign_bench.console import print_table
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores, computes_in_bfloat16, host_facts, package_versions
-from codesign_bench.method import Problem, load_method, method_names
+from codesign_bench.method import Problem, load_method, method_names, usable_methods
 from codesign_bench.processes import thread_environment
 from codesign_bench.seeding import Streams
 from codesign_bench.storage.files import json_bytes, write_output
@@ -121,7 +121,7 @@ def contestants() -> dict[str, Contestant]:
     from codesign_bench.benchmarks import rivals
     from codesign_bench.learning.ppo_method import PPOMethod
 
-    learners = [name for name in method_names() if issubclass(load_method(name), PPOMethod)]
+    learners = [name for name in usable_methods(method_names()) if issubclass(load_method(name), PPOMethod)]
     full = {name: Contestant(f"{name}, ours", ours(name)) for name in learners}
     reduced = {
         f"{name}_bf16": Contestant(f"{name}, ours, updates in bfloat16", ours(name, "bf16")) for name in learners

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from codesign_bench.config.resolve import resolve
-from codesign_bench.method import load_method, method_names
+from codesign_bench.method import load_method, method_names, usable_methods
 from codesign_bench.study import DEFAULT_STUDY, load_study
 from codesign_bench.task import task_names
 
@@ -62,7 +62,7 @@ def configured(setting: str, work: Workload) -> Any:
     Raises:
         LookupError: no method has it.
     """
-    for name in method_names():
+    for name in usable_methods(method_names()):
         config = resolve(load_method(name), work.task, work.profile).method
         if hasattr(config, setting):
             return getattr(config, setting)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,9 @@ from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.config.resolve import ResolvedConfig, check_overrides, differences, resolve
 from codesign_bench.config.run_settings import VALIDATION
 from codesign_bench.config.settings import StoredConfig
-from codesign_bench.method import Method, Problem, load_method
-from codesign_bench.task import Task, load_task
+from codesign_bench.console import Log
+from codesign_bench.method import Method, Problem, load_method, usable_methods
+from codesign_bench.task import Task, load_task, usable_tasks
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,14 @@ def resolve_cell(cell: Cell) -> ResolvedCell:
                 run = replace(config.run, **{name: value})
                 config = replace(config, run=run, sources={**config.sources, f"run.{name}": source})
     return ResolvedCell(cell, load_task(cell.task), method_class, config)
+
+
+def usable_cells(cells: Iterable[Cell], log: Log) -> list[Cell]:
+    """Return the cells whose task and method can be used in this Python; log what is left out, a line per reason."""
+    given = list(cells)
+    tasks = usable_tasks(dict.fromkeys(cell.task for cell in given), log)
+    methods = usable_methods(dict.fromkeys(cell.method for cell in given), log)
+    return [cell for cell in given if cell.task in tasks and cell.method in methods]
 
 
 def resolve_cells(cells: Sequence[Cell]) -> list[ResolvedCell]:

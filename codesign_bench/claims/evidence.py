@@ -24,7 +24,7 @@ from codesign_bench.stats import CELL_KEYS, MIN_SEEDS
 from codesign_bench.storage.cells import reported_cells
 from codesign_bench.storage.frames import load_evaluations, stored_curves
 from codesign_bench.storage.reference_points import load_reference_points
-from codesign_bench.task import load_task, task_names
+from codesign_bench.task import load_task, task_names, usable_tasks
 
 DESIGN_PREFIX = "design_"
 
@@ -169,10 +169,9 @@ def _design_widths(evaluations: pd.DataFrame) -> dict[str, dict[str, float]]:
     """Return the ranges of the design parameters of the known tasks in `evaluations`."""
     present = set(evaluations["task"]) if len(evaluations) else set()
     widths = {}
-    for name in task_names():
-        if name in present:
-            space = load_task(name).design_space
-            low, high = space.bounds
-            pairs = zip(space.names, (high - low).tolist(), strict=True)
-            widths[name] = {f"{DESIGN_PREFIX}{parameter}": width for parameter, width in pairs}
+    for name in usable_tasks(name for name in task_names() if name in present):
+        space = load_task(name).design_space
+        low, high = space.bounds
+        pairs = zip(space.names, (high - low).tolist(), strict=True)
+        widths[name] = {f"{DESIGN_PREFIX}{parameter}": width for parameter, width in pairs}
     return widths

@@ -32,7 +32,7 @@ def tools_vary(task: str, method: str, seeds: int) -> Rule:
         del rng  # nothing is drawn
         rows = evidence.instances(task, method)
         if task not in evidence.design_widths:
-            raise InsufficientData(f"the task '{task}' is unknown")
+            raise InsufficientData(f"the task '{task}' is unknown, or cannot be used in this Python")
         shares = goal_shares(rows, evidence.design_widths[task])
         found = stats.one_sample_t(shares, GOAL_SHARE)
         low, high = np.clip([found.low, found.high], 0.0, 1.0).tolist()

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.config.values import parse_int
+from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError, unknown_name
 from codesign_bench.registry import KINDS, names
 from codesign_bench.study import DEFAULT_STUDY, load_study
@@ -69,6 +70,15 @@ def add_sweep(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--retry-failed", action="store_true", help="run failed cells again")
 
 
+def add_same_code(parser: argparse.ArgumentParser) -> None:
+    """Add whether cells count that were run with other code of their task or method."""
+    parser.add_argument(
+        "--same-code",
+        action="store_true",
+        help="count and resume cells although the code of their task or method was changed since",
+    )
+
+
 def add_config(parser: argparse.ArgumentParser) -> None:
     """Add what determines a cell's configuration: profile, budget and individual settings."""
     add_profile(parser)
@@ -124,8 +134,7 @@ def chosen_names(group: str, given: Sequence[str], meanings: Mapping[str, Sequen
     Raises:
         UserError: an unknown name, or no name at all.
     """
-    words = [word for text in given for word in text.split(",") if word]
-    chosen = list(dict.fromkeys(name for word in words for name in meanings.get(word, (word,))))
+    chosen = list(dict.fromkeys(name for word in _words(given) for name in meanings.get(word, (word,))))
     known, kind = names(group), KINDS[group]
     for name in chosen:
         if name not in known:
@@ -135,21 +144,55 @@ def chosen_names(group: str, given: Sequence[str], meanings: Mapping[str, Sequen
     return chosen
 
 
-def chosen_tasks(given: Sequence[str]) -> list[str]:
+def chosen_tasks(given: Sequence[str], log: Log = silent) -> list[str]:
     """Return the tasks that `--task` selects.
 
+    What cannot be used in this Python is no part of `all`, and `log` names it; by its own name, it is refused.
+
     Raises:
         UserError: an unknown name, or no name at all.
+        UnavailableError: a task of this name cannot be used in this Python, or no task at all can.
     """
-    return chosen_names("tasks", given, {ALL: names("tasks")})
+    from codesign_bench.task import load_task, usable_tasks
+
+    chosen = chosen_names("tasks", given, {ALL: names("tasks")})
+    return _without_unusable(chosen, _words(given), load_task, usable_tasks, log)
 
 
-def chosen_methods(given: Sequence[str]) -> list[str]:
+def chosen_methods(given: Sequence[str], log: Log = silent) -> list[str]:
     """Return the methods that `--method` selects: `all` is those of the default study, `beyond` all others.
 
+    What cannot be used in this Python is no part of a group, and `log` names it; by its own name, it is refused.
+
     Raises:
         UserError: an unknown name, or no name at all.
+        UnavailableError: a method of this name cannot be used in this Python, or none of them can.
     """
+    from codesign_bench.method import load_method, usable_methods
+
     paper = load_study(DEFAULT_STUDY).methods
     beyond = tuple(name for name in names("methods") if name not in paper)
-    return chosen_names("methods", given, {ALL: paper, BEYOND: beyond})
+    chosen = chosen_names("methods", given, {ALL: paper, BEYOND: beyond})
+    return _without_unusable(chosen, _words(given), load_method, usable_methods, log)
+
+
+def _without_unusable(
+    chosen: list[str],
+    named: Sequence[str],
+    load: Callable[[str], object],
+    usable: Callable[[Sequence[str], Log], list[str]],
+    log: Log,
+) -> list[str]:
+    """Return the names that can be used; `load` refuses those of the others that are `named`, or one if none can."""
+    for name in chosen:
+        if name in named:
+            load(name)
+    found = usable(chosen, log)
+    if not found:
+        load(chosen[0])
+    return found
+
+
+def _words(given: Sequence[str]) -> list[str]:
+    """Return the words of an argument; each part of the command line may contain several, separated by commas."""
+    return [word for text in given for word in text.split(",") if word]

@@ -9,6 +9,7 @@ from rich.console import Console
 
 from codesign_bench.cli.arguments import ALL, check_at_least_one, chosen_tasks, integer
 from codesign_bench.config.profiles import profile_named
+from codesign_bench.console import printer
 from codesign_bench.errors import unknown_name
 
 HELP = "measure the speed of tasks and learners on this machine"
@@ -44,7 +45,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.what == "tasks":
         from codesign_bench.benchmarks.tasks import bench_tasks
 
-        bench_tasks(chosen_tasks(options.task), options.seconds, console)
+        bench_tasks(chosen_tasks(options.task, printer(console)), options.seconds, console)
         return 0
     from codesign_bench.benchmarks.learner import bench_learner, contestants
     from codesign_bench.benchmarks.workload import Workload

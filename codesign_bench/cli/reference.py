@@ -33,7 +33,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.text_tables import markdown
 
     check_at_least_one(options, "jobs")
-    tasks, log = chosen_tasks(options.task), printer(console)
+    log = printer(console)
+    tasks = chosen_tasks(options.task, log)
     tell_left_out(lines(options.results, survey(options.results)))
     jobs = options.jobs or os.cpu_count() or 1
     measure_missing(options.results, tasks, log, again=options.again, jobs=jobs)

@@ -14,6 +14,7 @@ from codesign_bench.cli.arguments import (
     add_jobs,
     add_out,
     add_profile,
+    add_same_code,
     add_study,
     check_at_least_one,
     integer,
@@ -34,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_jobs(parser)
     add_out(parser, DEFAULT_RESULTS)
+    add_same_code(parser)
     parser.add_argument(
         "--figures",
         type=Path,
@@ -59,4 +61,5 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console=console,
         jobs=options.jobs,
         seeds=options.seeds,
+        same_code=options.same_code,
     )

@@ -18,6 +18,7 @@ from codesign_bench.cli.arguments import (
     add_config,
     add_jobs,
     add_out,
+    add_same_code,
     add_sweep,
     check_at_least_one,
     chosen_methods,
@@ -25,6 +26,7 @@ from codesign_bench.cli.arguments import (
     integer,
 )
 from codesign_bench.config.run_settings import DEVICES, PRECISIONS
+from codesign_bench.console import printer
 from codesign_bench.errors import UserError
 
 if TYPE_CHECKING:
@@ -65,6 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_out(parser, DEFAULT_RESULTS)
     add_sweep(parser)
+    add_same_code(parser)
 
 
 # Modules that import pandas or torch are imported inside functions, so that `list` and `--help` need neither.
@@ -77,9 +80,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.sweep.runner import run_sweep
 
     check_at_least_one(options, "steps", "jobs")
+    log = printer(console)
     cells = grid(
-        tasks=chosen_tasks(options.task),
-        methods=chosen_methods(options.method),
+        tasks=chosen_tasks(options.task, log),
+        methods=chosen_methods(options.method, log),
         seeds=parse_seeds(options.seeds),
         variants=variants_of(axis_values(options)),
         profile=options.profile,
@@ -98,6 +102,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         retry_failed=options.retry_failed,
         backend=options.backend,
         scheduler=options.scheduler,
+        same_code=options.same_code,
     )
 
 

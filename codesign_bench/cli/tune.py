@@ -8,7 +8,16 @@ from pathlib import Path
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import add_jobs, add_profile, add_study, add_sweep, check_at_least_one, integer
+from codesign_bench.cli.arguments import (
+    add_jobs,
+    add_profile,
+    add_same_code,
+    add_study,
+    add_sweep,
+    check_at_least_one,
+    integer,
+)
+from codesign_bench.console import printer
 from codesign_bench.study import load_study
 
 HELP = "search the settings of every method of a study, with the same effort"
@@ -29,16 +38,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_jobs(parser)
     add_sweep(parser)
+    add_same_code(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Search, or print the plan; return 1 if a cell failed."""
-    from codesign_bench.tuning.tune import print_plan, tune, tuning_of
+    from codesign_bench.tuning.tune import print_plan, tune, tuning_of, usable_part
 
     check_at_least_one(options, "steps", "jobs")
     study = load_study(options.study)
     if options.plan:
-        print_plan(console, tuning_of(study), options.profile, options.steps)
+        print_plan(console, usable_part(tuning_of(study), printer(console)), options.profile, options.steps)
         return 0
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does
     return tune(
@@ -51,4 +61,5 @@ def run(options: argparse.Namespace, console: Console) -> int:
         retry_failed=options.retry_failed,
         backend=options.backend,
         scheduler=options.scheduler,
+        same_code=options.same_code,
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from codesign_bench.config.settings import Settings, sourced
 from codesign_bench.errors import unknown_name
-from codesign_bench.registry import load_attribute, names
+from codesign_bench.registry import load_attribute, usable_modules
 
 DEFAULT_PROFILE = "laptop"
 
@@ -58,7 +58,8 @@ BUILT_IN: Mapping[str, Profile] = {
 
 def profiles() -> dict[str, Profile]:
     """Return all profiles by name: the built-in ones, then those of every study."""
-    return {**BUILT_IN, **{profile.name: profile for study in names("studies") for profile in _of_study(study)}}
+    added = (profile for study in usable_modules("studies") for profile in _of_study(study))
+    return {**BUILT_IN, **{profile.name: profile for profile in added}}
 
 
 def profile_named(name: str) -> Profile:

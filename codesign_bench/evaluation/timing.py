@@ -12,10 +12,11 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 from codesign_bench.cell.variant import DEFAULT
+from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import StoredCell, reported_cells
 from codesign_bench.storage.policies import misfit, policy_of
-from codesign_bench.task import load_task
+from codesign_bench.task import load_task, task_names, usable_tasks
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.play import designed
 
@@ -26,12 +27,13 @@ CALLS = 200
 """Number of timed calls of a policy, with one observation each."""
 
 
-def timing_frame(results: Path) -> pd.DataFrame:
+def timing_frame(results: Path, log: Log = silent) -> pd.DataFrame:
     """Return one row per finished cell of the default variant below `results`.
 
     Columns: task, method, label, seed, profile, env_steps, train_s (without evaluation), cores (of the
     cell), cpu, inference_s (median time of one control step's policy call; one seed per task and method is timed, NaN
-    elsewhere and where there is no policy that fits the task's observation).
+    elsewhere and where there is no policy that fits the task's observation). `log` names tasks that cannot be played in
+    this Python.
 
     Raises:
         UserError: there is no such cell.
@@ -39,13 +41,15 @@ def timing_frame(results: Path) -> pd.DataFrame:
     import pandas as pd
 
     rows = []
+    present = {cell.record.task for cell in reported_cells(results)}
+    playable = usable_tasks([name for name in task_names() if name in present], log)
     timed: set[tuple[str, str]] = set()
     for cell in reported_cells(results):
         record = cell.record
         if not cell.is_done or record.variant != DEFAULT:
             continue
         pair = (record.task, record.method)
-        is_timed = pair not in timed and _fits(cell)
+        is_timed = record.task in playable and pair not in timed and _fits(cell)
         if is_timed:
             timed.add(pair)
         rows.append(

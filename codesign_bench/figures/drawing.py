@@ -18,15 +18,15 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from codesign_bench.console import Log
+from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
 from codesign_bench.figures.comparison import made_otherwise, with_compared
 from codesign_bench.figures.source import Request, Source, curves
-from codesign_bench.registry import load_module, names
+from codesign_bench.registry import load_module, usable_modules
 from codesign_bench.storage.files import Outputs, make_folder
 from codesign_bench.storage.frames import stored_curves
 from codesign_bench.storage.tables import csv_bytes
-from codesign_bench.study.study import DEFAULT_STUDY, Study, load_study, study_names
+from codesign_bench.study.study import DEFAULT_STUDY, Study, load_study
 from codesign_bench.visible_text import in_figure
 
 if TYPE_CHECKING:
@@ -69,9 +69,9 @@ def draw_figures(
     Raises:
         UserError: an unknown figure, a folder that is not writable, or no figure can be drawn.
     """
-    modules = {name: load_module("paper_figs", name) for name in wanted or figure_names(study)}
+    modules = {name: load_module("paper_figs", name) for name in wanted or figure_names(study, log)}
     if compare is not None and not any(getattr(module, "COMPARES", False) for module in modules.values()):
-        known = {name: load_module("paper_figs", name) for name in names("paper_figs")}
+        known = {name: load_module("paper_figs", name) for name in usable_modules("paper_figs")}
         choices = [name for name, module in known.items() if getattr(module, "COMPARES", False)]
         raise UserError(f"--compare: {', '.join(wanted)} show no curves; choose from: {', '.join(choices)}")
     if not wanted and not results.is_dir():
@@ -90,16 +90,21 @@ def draw_figures(
         log(str(path))
 
 
-def figure_names(study: Study | None) -> list[str]:
-    """Return the figures of a study (None: the default one), and those that belong to no study."""
+def figure_names(study: Study | None, log: Log = silent) -> list[str]:
+    """Return the figures of a study (None: the default one), and those that belong to no study.
+
+    `log` names those that cannot be imported in this Python, and why.
+    """
     chosen = load_study(DEFAULT_STUDY) if study is None else study
-    of_others = {name for other in study_names() if other != chosen.name for name in load_study(other).figures}
-    return [name for name in names("paper_figs") if name in chosen.figures or name not in of_others]
+    of_others = {
+        name for other in usable_modules("studies") if other != chosen.name for name in load_study(other).figures
+    }
+    return [name for name in usable_modules("paper_figs", log) if name in chosen.figures or name not in of_others]
 
 
 def possible_drawings(results: Path, log: Log, study: Study | None = None) -> Iterator[Drawing]:
     """Yield every figure of a study that can be drawn; `log` gets those that are left out, and why."""
-    modules = {name: load_module("paper_figs", name) for name in figure_names(study)}
+    modules = {name: load_module("paper_figs", name) for name in figure_names(study, log)}
     return _drawings(modules, Request(results, log))
 
 

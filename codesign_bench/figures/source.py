@@ -68,7 +68,7 @@ def timing(request: Request) -> pd.DataFrame:
     """Return the training times of cells and the inference times of their policies."""
     from codesign_bench.evaluation.timing import timing_frame
 
-    return timing_frame(request.results)
+    return timing_frame(request.results, request.log)
 
 
 def trials_on_an_arm(request: Request) -> pd.DataFrame:

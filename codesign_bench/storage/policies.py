@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from codesign_bench.config.resolve import method_config
-from codesign_bench.errors import ChangedTaskError, UserError
+from codesign_bench.errors import ChangedTaskError, UnavailableError, UserError
 from codesign_bench.method import Array, Policy, load_method
 from codesign_bench.storage.arrays import load_arrays, save_arrays
 from codesign_bench.storage.cells import StoredCell, open_cell
@@ -60,14 +60,14 @@ def policy_of(cell: StoredCell) -> Policy:
 
 
 def misfit(cell: StoredCell) -> str:
-    """Return why a cell's final policy cannot act on its task as it is now, or "" if it can.
+    """Return why a cell's final policy cannot act on its task as it is now, or in this Python, or "" if it can.
 
     Raises:
         UserError: the cell is not finished, or its files are damaged or otherwise incompatible with this version.
     """
     try:
         policy_of(cell)
-    except ChangedTaskError as error:
+    except (ChangedTaskError, UnavailableError) as error:
         return str(error)
     return ""
 

@@ -46,6 +46,7 @@ def differences(folders: Mapping[str, Sequence[CellRecord]]) -> list[str]:
     lines = [
         _code_line(cells),
         _changes_line(cells),
+        *_package_lines(cells),
         _processor_line(cells),
         _library_line(cells),
         _resumed_line(cells),
@@ -63,7 +64,21 @@ def as_markdown(paragraph: Sequence[str]) -> str:
 def same_conditions(one: Conditions, other: Conditions) -> bool:
     """Return whether two parts of training had the same code, processor and libraries, as far as is recorded."""
     same_code = one["code"].get("fingerprint") == other["code"].get("fingerprint")
-    return same_code and one["versions"] == other["versions"] and processor(one) == processor(other)
+    return (
+        same_code
+        and not _other_code(one, other)
+        and one["versions"] == other["versions"]
+        and processor(one) == processor(other)
+    )
+
+
+def _other_code(one: Conditions, other: Conditions) -> bool:
+    """Return whether code of packages, or own code of task or method, differs where both parts record it."""
+    for entry, told in (("packages", "fingerprint"), ("members", "files")):
+        first, second = one.get(entry, {}), other.get(entry, {})
+        if any(first[name].get(told) != second[name].get(told) for name in first.keys() & second.keys()):
+            return True
+    return False
 
 
 def code(conditions: Conditions) -> str:
@@ -96,6 +111,20 @@ def _code_line(cells: Sequence[Origin]) -> str:
 def _changes_line(cells: Sequence[Origin]) -> str:
     changed = [cell for cell in cells if cell[1].code.get("changed")]
     return f"changes that are in no commit: {_cells(changed, cells)}" if changed else ""
+
+
+def _package_lines(cells: Sequence[Origin]) -> list[str]:
+    """Return a line for each package of other members whose code differs between the cells that record it."""
+    lines = []
+    for name in dict.fromkeys(name for _, record in cells for name in record.packages):
+        having = [cell for cell in cells if name in cell[1].packages]
+
+        def told(record: CellRecord, name: str = name) -> str:
+            return code({"code": record.packages[name]})
+
+        if len({record.packages[name].get("fingerprint") for _, record in having}) > 1:
+            lines.append(f"commits of {name}: {_counted(having, told)}")
+    return lines
 
 
 def _processor_line(cells: Sequence[Origin]) -> str:

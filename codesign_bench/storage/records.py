@@ -11,6 +11,7 @@ from typing import Any
 from codesign_bench.cell.variant import FIRST_AXES, Variant
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.config.settings import StoredConfig
+from codesign_bench.member_code import MemberCode
 from codesign_bench.storage.files import write_json
 from codesign_bench.storage.json_fields import entries, number, optional, text, whole
 from codesign_bench.storage.reading import JSON_BYTES, DamagedFile, NewerFile, parse_json, read_bytes
@@ -79,6 +80,10 @@ class CellRecord:
     """Package -> version, those that decide numbers, Python and the C library; None: not installed."""
     code: Mapping[str, Any] = field(default_factory=dict)
     """Version, commit, whether files differ from it, and their fingerprint; empty in cells of version 0.1.0."""
+    packages: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """Package of another's task or method -> the same of its code; empty in cells of former versions."""
+    members: Mapping[str, MemberCode] = field(default_factory=dict)
+    """"task" and "method" -> their own code; empty in cells of former versions."""
     host: Mapping[str, Any] = field(default_factory=dict)
     """The machine; cells of version 0.1.0 name no instruction sets."""
     earlier: tuple[Mapping[str, Any], ...] = ()
@@ -97,7 +102,13 @@ class CellRecord:
     @property
     def conditions(self) -> dict[str, Any]:
         """What numbers depend on in addition to the configuration, as JSON values."""
-        return {"code": dict(self.code), "versions": dict(self.versions), "host": dict(self.host)}
+        return {
+            "code": dict(self.code),
+            "packages": {name: dict(code) for name, code in self.packages.items()},
+            "members": {kind: code.to_json() for kind, code in self.members.items()},
+            "versions": dict(self.versions),
+            "host": dict(self.host),
+        }
 
     @classmethod
     def read(cls, folder: Path) -> CellRecord | None:
@@ -180,13 +191,13 @@ class CellRecord:
             config=_config(content),
             versions=_texts_or_none(content, "versions"),
             **_code_and_host(content),
+            packages={name: entries(content["packages"], name) for name in _named(content, "packages")},
+            members={name: _member(content["members"], name) for name in _named(content, "members")},
             earlier=tuple(_conditions(part) for part in content.get("earlier", ())),
             pid=optional(whole, content, "pid"),
             timings=_timings(content),
             failure=_failure(content),
-            checksums={
-                name: text(content["checksums"], name) for name in optional(entries, content, "checksums") or ()
-            },
+            checksums={name: text(content["checksums"], name) for name in _named(content, "checksums")},
         )
 
 
@@ -243,6 +254,17 @@ def _conditions(part: Any) -> dict[str, Any]:
     if not isinstance(part, dict):
         raise ValueError("'earlier' is not a list of objects")
     return {**part, "versions": _texts_or_none(part, "versions"), **_code_and_host(part)}
+
+
+def _named(content: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Return an object, empty if it is absent or null."""
+    return optional(entries, content, name) or {}
+
+
+def _member(content: Mapping[str, Any], name: str) -> MemberCode:
+    own = entries(content, name)
+    files = {module: text(entries(own, "files"), module) for module in entries(own, "files")}
+    return MemberCode(text(own, "module"), text(own, "package"), files)
 
 
 def _timings(content: Mapping[str, Any]) -> Timings:

@@ -26,12 +26,14 @@ from codesign_bench.machine import host_facts, package_versions
 from codesign_bench.plugins import import_modules
 from codesign_bench.processes import EXIT_ORPHANED
 from codesign_bench.storage.cells import table_checksums
+from codesign_bench.storage.checkpoint import remove_checkpoint
 from codesign_bench.storage.files import remove_partial_files
-from codesign_bench.storage.layout import remove_leftovers
+from codesign_bench.storage.layout import CHECKPOINT_FILE, remove_leftovers
 from codesign_bench.storage.locks import locked
 from codesign_bench.storage.provenance import same_conditions
 from codesign_bench.storage.records import DONE, FAILED, CellRecord, Failure, Timings, now
 from codesign_bench.storage.system_errors import momentary_cause
+from codesign_bench.sweep.stale import changed_members, other_packages, own_code
 from codesign_bench.sweep.training import CellRun
 
 EXIT_DONE, EXIT_FAILED, EXIT_REFUSED, EXIT_BUSY = 0, 1, 2, 75
@@ -44,7 +46,8 @@ LOCK_SECONDS = 2.0
 def main(arguments: list[str] | None = None) -> int:
     """Run a cell, given as JSON by the first argument, in the results folder of the second argument.
 
-    With `retry` as the third argument, a failed cell runs again. Returns one of the exit codes above.
+    With `retry` among further arguments, a failed cell runs again; with `same-code`, a cell that was begun with other
+    code of its task or method resumes. Returns one of the exit codes above.
     """
     cell_json, out, *options = sys.argv[1:] if arguments is None else arguments
     cell = Cell.from_json(cell_json)
@@ -52,7 +55,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with locked(folder, LOCK_SECONDS):
-            return run_locked(cell, folder, retry="retry" in options)
+            return run_locked(cell, folder, retry="retry" in options, same_code="same-code" in options)
     except filelock.Timeout:
         return EXIT_BUSY
     except Exception as error:
@@ -64,7 +67,7 @@ def main(arguments: list[str] | None = None) -> int:
         return EXIT_REFUSED if number is None else EXIT_SYSTEM_ERROR + number
 
 
-def run_locked(cell: Cell, folder: Path, *, retry: bool) -> int:
+def run_locked(cell: Cell, folder: Path, *, retry: bool, same_code: bool = False) -> int:
     """Run `cell` while holding its lock, unless another process has finished it; return the exit code."""
     before = CellRecord.read(folder)
     if before is not None and before.status == DONE:
@@ -76,6 +79,12 @@ def run_locked(cell: Cell, folder: Path, *, retry: bool) -> int:
     if before is not None and (different := resolved.differences(before.config, before.task_version)):
         print(f"the stored configuration differs: {'; '.join(different)}", file=sys.stderr)
         return EXIT_REFUSED
+    if before is not None and not same_code and (changed := changed_members(resolved, before)):
+        if before.status != FAILED:
+            print(f"it was begun with other code of {' and '.join(changed)}", file=sys.stderr)
+            return EXIT_REFUSED
+        remove_checkpoint(folder / CHECKPOINT_FILE)  # a failed cell that is mended starts anew
+        before = None
     remove_partial_files(folder)
     pin_threads()
     record = describe(resolved, before)
@@ -98,6 +107,8 @@ def describe(resolved: ResolvedCell, before: CellRecord | None) -> CellRecord:
         config=config.stored(),
         versions=package_versions(),
         code=code_version().to_json(),
+        packages=other_packages(resolved),
+        members=own_code(resolved),
         host=host_facts(config.run.threads),
         pid=os.getpid(),
         timings=Timings(started=now() if before is None else before.timings.started),

@@ -25,6 +25,7 @@ from codesign_bench.storage.records import DONE, FAILED, INTERRUPTED, CellRecord
 from codesign_bench.storage.system_errors import momentary_cause
 from codesign_bench.sweep.backends import Backend, ClusterLost, WorkersDied, make_backend
 from codesign_bench.sweep.progress import ProgressDisplay
+from codesign_bench.sweep.stale import StoredWith, code_notes, pretrained, refuse_other_code
 from codesign_bench.sweep.workers import BUSY, Job, Outcome
 
 EXIT_ALL_DONE, EXIT_SOME_FAILED = 0, 1
@@ -45,6 +46,8 @@ class Plan:
     unreadable: dict[Cell, str]
     """Cells whose files cannot be read at the moment, with the reasons."""
     pending: list[ResolvedCell]
+    notes: list[str]
+    """How the code differs from that of stored cells, one line each."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +59,14 @@ class Trouble:
     """Cells that the same command resumes."""
 
 
-def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = False) -> Plan:
+def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = False, same_code: bool = False) -> Plan:
     """Sort `cells` into done, failed and pending ones in `out`, before anything runs.
 
     Raises:
-        UserError: a stored cell has another configuration, or one that cells start from is not done.
+        UserError: a stored cell has another configuration, was run with other code of its task or method (unless
+            `same_code` says that this makes no difference), or one that cells start from is not done.
     """
-    plan = Plan([], {}, {}, {}, [])
+    plan = Plan([], {}, {}, {}, [], [])
     records: dict[Cell, CellRecord | None] = {}
     for resolved in cells:
         try:
@@ -72,6 +76,10 @@ def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = 
     readable = [resolved for resolved in cells if resolved.cell in records]
     _refuse_other_configurations(readable, records, out)
     _refuse_without_pretrained([resolved.cell for resolved in readable], out)
+    stored = [StoredWith(resolved, record) for resolved in readable if (record := records[resolved.cell]) is not None]
+    if not same_code:
+        refuse_other_code([*stored, *pretrained(readable, out)], out)
+    plan.notes.extend(code_notes(stored, retry_failed=retry_failed))
     for resolved in readable:
         _sort_into(plan, resolved, records[resolved.cell], out, retry_failed=retry_failed)
     return plan
@@ -137,6 +145,7 @@ def run_sweep(
     retry_failed: bool = False,
     backend: str = "loky",
     scheduler: str | None = None,
+    same_code: bool = False,
 ) -> int:
     """Run every cell that is not done in `out`; return 0 if all are done at the end, 1 if some failed.
 
@@ -145,12 +154,14 @@ def run_sweep(
         KeyboardInterrupt: the user stopped the sweep; its processes have ended, and the same call resumes it.
     """
     open_folder(out)
-    plan = make_plan(cells, out, retry_failed=retry_failed)
+    plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code)
     threads = max((resolved.config.run.threads for resolved in cells), default=1)
     used_jobs, split = split_cores(available_cores(), len(plan.pending), threads, jobs)
     chosen = make_backend(backend, used_jobs, scheduler)
     say = printer(console)
     say(f"{len(cells)} cells, {len(plan.done)} of them already done; results in {out}")
+    for note in plan.notes:
+        say(note)
     for cell in plan.done:
         sweep_leftovers(cell.folder(out))
     trouble = Trouble(plan.failed | plan.unusable, dict(plan.unreadable))
@@ -159,7 +170,7 @@ def run_sweep(
         if not has_locks(out):
             say(f"the file system of {out} has no locks: each running cell is guarded by a file, {HOLDER_FILE}")
         imported = os.environ.get(IMPORTS_VARIABLE, "")
-        queue = [Job(resolved.cell, str(out), retry_failed, imported) for resolved in plan.pending]
+        queue = [Job(resolved.cell, str(out), retry_failed, imported, same_code) for resolved in plan.pending]
         budgets = {resolved.cell: resolved.config.run.steps for resolved in plan.pending}
         with chosen as workers, ProgressDisplay(console, out, budgets) as display:
             _run_queue(queue, workers, display, trouble)

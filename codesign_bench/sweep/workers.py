@@ -44,6 +44,8 @@ class Job:
     retry_failed: bool
     imported: str
     """Modules of `--import`, as in the environment variable, which a worker on another machine does not have."""
+    same_code: bool = False
+    """Whether a cell that was begun with other code of its task or method resumes."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ def _run_process(job: Job, folder: Path) -> int:
     command = [sys.executable, "-c", START, json.dumps(sys.path), job.cell.to_json(), job.out]
     with _open_log(folder) as log:
         process = subprocess.Popen(
-            [*command, *(["retry"] if job.retry_failed else [])],
+            [*command, *(["retry"] if job.retry_failed else []), *(["same-code"] if job.same_code else [])],
             stdin=subprocess.PIPE,  # never written to; it closes when the parent dies, which ends the process
             stdout=log,
             stderr=log,

@@ -6,7 +6,7 @@ Gymnasium environments, `robot.py` what a task must define to be deployed on an 
 """
 
 from codesign_bench.task.behaviour import Behaviour
-from codesign_bench.task.loading import deployable_tasks, deployment_of, load_task, task_names
+from codesign_bench.task.loading import deployable_tasks, deployment_of, load_task, task_names, usable_tasks
 from codesign_bench.task.scene import OURS, Constant, Given, constants
 from codesign_bench.task.simulator import Physics, Simulator, Soundness
 from codesign_bench.task.spaces import Booleans, Box, Floats, Frame, Layout, Observed, Quantity, Singles, Slots, Span
@@ -43,4 +43,5 @@ __all__ = [
     "deployment_of",
     "load_task",
     "task_names",
+    "usable_tasks",
 ]

@@ -16,8 +16,10 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from codesign_bench.task.episodes import Episodes, Tradeoff
+from codesign_bench.task.checks import NotCopied, checked_actions, checked_instance, checked_mask
+from codesign_bench.task.episodes import Tradeoff
 from codesign_bench.task.loading import load_task, task_names
+from codesign_bench.task.rollouts import Rollouts
 from codesign_bench.task.spaces import Booleans, Floats, Singles, Slots
 from codesign_bench.task.task import Task
 
@@ -58,60 +60,15 @@ def observation_space(task: Task) -> Box:
     return Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
 
 
-def _rendering(task: Task, rollouts: _Rollouts) -> dict[str, Any]:
+def _rendering(task: Task, rollouts: Rollouts, mode: str | None) -> dict[str, Any]:
     """Return the metadata on rendering; a task that draws no pictures has no render mode."""
     modes = [RGB_ARRAY] if rollouts.episodes.simulator.draws else []
+    if mode is not None and mode not in modes:
+        raise ValueError(f"render_mode {mode!r}: the task '{task.name}' has {' and '.join(modes) or 'no render mode'}")
     return {"render_modes": modes, "render_fps": round(1.0 / task.control_period)}
 
 
-class _Rollouts:
-    """The episodes of `B` environments, which may be in different phases."""
-
-    def __init__(self, task: Task, num_slots: int, tradeoff: Tradeoff | None) -> None:
-        self.task = task
-        self.episodes = Episodes(task, num_slots, tradeoff)
-        self.designing: Booleans = np.zeros(num_slots, dtype=bool)
-        """(B,) whether the next step is the design step."""
-        self.ended: Booleans = np.ones(num_slots, dtype=bool)
-        """(B,) whether the episode has ended or was never started."""
-        self.controlled: Booleans = np.zeros(num_slots, dtype=bool)
-        """(B,) whether the last step was a control step."""
-
-    def reset(self, slots: Slots, instances: Floats) -> None:
-        """Begin episodes of `instances` (b, I) in `slots` (b,)."""
-        self.episodes.begin(slots, instances)
-        self.designing[slots] = True
-        self.ended[slots] = self.controlled[slots] = False
-
-    def step(self, slots: Slots, actions: Floats) -> tuple[Floats, Booleans, Booleans]:
-        """Take one design or control step in `slots` (b,) with actions (b, D + C).
-
-        Returns:
-            reward, terminated and truncated, each (b,).
-        """
-        if self.ended[slots].any():
-            raise gymnasium.error.ResetNeeded("an episode has ended or was never started: call reset() before step()")
-        reward = np.zeros(len(slots))
-        terminated, truncated = np.zeros(len(slots), dtype=bool), np.zeros(len(slots), dtype=bool)
-        size = self.task.design_space.size
-        first = self.designing[slots]
-        if first.any():
-            self.episodes.design(slots[first], actions[first, :size])
-        if not first.all():
-            later = ~first
-            outcome = self.episodes.control(slots[later], actions[later, size:])
-            reward[later], terminated[later], truncated[later] = outcome
-        self.designing[slots] = False
-        self.controlled[slots] = ~first
-        self.ended[slots] = terminated | truncated
-        return reward, terminated, truncated
-
-    def sample(self, slot_generators: Sequence[np.random.Generator]) -> Floats:
-        """Return (b, I) instances, one per generator: an environment's instances do not depend on the others."""
-        return np.concatenate([self.task.sample_instances(rng, 1) for rng in slot_generators])
-
-
-class ToolEnv(gymnasium.Env[Any, Any]):
+class ToolEnv(NotCopied, gymnasium.Env[Any, Any]):
     """One two-phase episode at a time: the first step builds the tool, all later steps use it.
 
     Action space
@@ -133,6 +90,11 @@ class ToolEnv(gymnasium.Env[Any, Any]):
     Info
         `info["reward_terms"]` on control steps: name -> value of the terms that add up to this step's reward. The names
         are those of `Task.reward_terms` (a single term, `task`, if the task names none) and `tradeoff`.
+
+    Refused calls
+        An action or instance of another shape, that is not finite, or an instance outside of the instance space, raises
+        a `ValueError` before anything changes. Actions outside of [-1, 1] act like the bounds. Environments cannot be
+        copied or pickled.
     """
 
     metadata: dict[str, Any] = {"render_modes": [RGB_ARRAY]}  # noqa: RUF012 - Gymnasium reads it from the class
@@ -142,17 +104,23 @@ class ToolEnv(gymnasium.Env[Any, Any]):
         self.observation_space = observation_space(self.task)
         self.action_space = action_space(self.task)
         self.render_mode = render_mode
-        self._rollouts = _Rollouts(self.task, 1, tradeoff)
-        self.metadata = {**self.metadata, **_rendering(self.task, self._rollouts)}
+        self._rollouts = Rollouts(self.task, 1, tradeoff)
+        self.metadata = {**self.metadata, **_rendering(self.task, self._rollouts, render_mode)}
         self._slots: Slots = np.zeros(1, dtype=np.intp)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Singles, dict[str, Any]]:
-        """Begin an episode; `seed` reseeds the generator of instances."""
-        super().reset(seed=seed)
+        """Begin an episode; `seed` reseeds the generator of instances.
+
+        Raises:
+            ValueError: the instance in `options` has another shape or is not in the instance space.
+        """
         given = (options or {}).get("instance")
-        instances = self._rollouts.sample([self.np_random]) if given is None else _given(given, self.task, 1)
+        instances = None if given is None else checked_instance(given, self.task.instance_space)
+        super().reset(seed=seed)
+        if instances is None:
+            instances = self._rollouts.sample([self.np_random])
         self._rollouts.reset(self._slots, instances)
         return self._observation(), {}
 
@@ -161,16 +129,18 @@ class ToolEnv(gymnasium.Env[Any, Any]):
 
         Raises:
             gymnasium.error.ResetNeeded: no episode is running.
-            ValueError: the action is not finite.
+            ValueError: the action has another shape or is not finite.
         """
-        actions = np.asarray(action, dtype=np.float64)[None]
+        if self._rollouts.ended[0]:
+            raise gymnasium.error.ResetNeeded("the episode has ended or was never started: call reset() before step()")
+        actions = checked_actions(action, self.task.design_space, self.task.control_space)[None]
         reward, terminated, truncated = self._rollouts.step(self._slots, actions)
         ended = bool(terminated[0] or truncated[0])
         return self._observation(), float(reward[0]), bool(terminated[0]), bool(truncated[0]), self._info(ended)
 
     def render(self) -> Any:
         """Return a picture of the scene, (height, width, 3), in RGB, with `render_mode="rgb_array"`; else None."""
-        return self._rollouts.episodes.simulator.render(0) if self.render_mode == RGB_ARRAY else None
+        return self._rollouts.render(0) if self.render_mode == RGB_ARRAY else None
 
     def _observation(self) -> Singles:
         return self._rollouts.episodes.observation[0].copy()
@@ -184,7 +154,7 @@ class ToolEnv(gymnasium.Env[Any, Any]):
         return info
 
 
-class ToolVectorEnv(VectorEnv[Any, Any, Any]):
+class ToolVectorEnv(NotCopied, VectorEnv[Any, Any, Any]):
     """`num_envs` environments like `ToolEnv` in one process, on the same batched simulator that methods train on.
 
     The step after an episode's last step begins the next episode (Gymnasium's NEXT_STEP): it ignores the action and has
@@ -201,15 +171,17 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
     def __init__(
         self, task_name: str, num_envs: int = 1, tradeoff: Tradeoff | None = None, render_mode: str | None = None
     ) -> None:
+        if not isinstance(num_envs, int | np.integer) or num_envs < 1:
+            raise ValueError(f"num_envs must be a positive integer, not {num_envs!r}")
         self.task = load_task(task_name)
-        self.num_envs = num_envs
+        self.num_envs = num_envs = int(num_envs)
         self.render_mode = render_mode
         self.single_observation_space = observation_space(self.task)
         self.single_action_space = action_space(self.task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._rollouts = _Rollouts(self.task, num_envs, tradeoff)
-        self.metadata = {**self.metadata, **_rendering(self.task, self._rollouts)}
+        self._rollouts = Rollouts(self.task, num_envs, tradeoff)
+        self.metadata = {**self.metadata, **_rendering(self.task, self._rollouts, render_mode)}
         self._generators: list[np.random.Generator] = [seeding.np_random()[0] for _ in range(num_envs)]
 
     def reset(
@@ -220,17 +192,21 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
         Args:
             seed: reseeds the generators of instances: environment `i` gets `seed + i`, or `seed[i]` (None: unchanged).
             options: may hold `instance`, (I,) for all or (B, I), and `reset_mask`.
+
+        Raises:
+            ValueError: an option has another shape, an instance is not in the instance space, or the seeds are too few.
         """
         chosen = options or {}
-        slots: Slots = np.flatnonzero(chosen.get("reset_mask", np.ones(self.num_envs, dtype=bool)))
-        for slot, value in enumerate(self._seeds(seed)):
-            if value is not None and slot in slots:
-                self._generators[slot] = seeding.np_random(value)[0]
-        given = chosen.get("instance")
-        if given is None:
+        slots = checked_mask(chosen.get("reset_mask"), self.num_envs)
+        given, generators = chosen.get("instance"), self._seeded(seed)
+        space = self.task.instance_space
+        instances = None if given is None else checked_instance(given, space, slots, self.num_envs)
+        for slot in slots:
+            self._generators[slot] = generators.get(slot, self._generators[slot])
+        if instances is None:
             self._begin(slots)
         else:
-            self._rollouts.reset(slots, _given(given, self.task, self.num_envs)[slots])
+            self._rollouts.reset(slots, instances)
         return self._rollouts.episodes.observation.copy(), {}
 
     def step(self, actions: Singles) -> tuple[Singles, Floats, Booleans, Booleans, dict[str, Any]]:
@@ -240,13 +216,16 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
             observation (B, O), reward, terminated and truncated, each (B,), and info.
 
         Raises:
-            ValueError: an action is not finite.
+            gymnasium.error.ResetNeeded: an environment was never reset.
+            ValueError: the actions have another shape, or one is not finite, even that of an ended episode.
         """
+        self._rollouts.need_start("step")
+        checked = checked_actions(actions, self.task.design_space, self.task.control_space, self.num_envs)
         reward = np.zeros(self.num_envs)
         terminated, truncated = np.zeros(self.num_envs, dtype=bool), np.zeros(self.num_envs, dtype=bool)
         over, going = np.flatnonzero(self._rollouts.ended), np.flatnonzero(~self._rollouts.ended)
         if len(going):
-            outcome = self._rollouts.step(going, np.asarray(actions, dtype=np.float64)[going])
+            outcome = self._rollouts.step(going, checked[going])
             reward[going], terminated[going], truncated[going] = outcome
         if len(over):
             self._begin(over)
@@ -254,18 +233,22 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
 
     def render(self) -> tuple[Any, ...] | None:
         """Return a picture of every scene with `render_mode="rgb_array"`; else None."""
-        simulator = self._rollouts.episodes.simulator
-        return tuple(simulator.render(slot) for slot in range(self.num_envs)) if self.render_mode == RGB_ARRAY else None
+        if self.render_mode != RGB_ARRAY:
+            return None
+        return tuple(self._rollouts.render(slot) for slot in range(self.num_envs))
 
     def _begin(self, slots: Slots) -> None:
         self._rollouts.reset(slots, self._rollouts.sample([self._generators[slot] for slot in slots]))
 
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        if seed is None or isinstance(seed, int):
-            return [None if seed is None else seed + slot for slot in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise ValueError(f"{len(seed)} seeds given for {self.num_envs} environments")
-        return seed
+    def _seeded(self, seed: int | Sequence[int | None] | None) -> dict[int, np.random.Generator]:
+        """Return the new generators of the environments that get a seed."""
+        if seed is None or isinstance(seed, int | np.integer):
+            seeds: Sequence[int | None] = [None if seed is None else int(seed) + slot for slot in range(self.num_envs)]
+        else:
+            seeds = seed
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"{len(seeds)} seeds given for {self.num_envs} environments")
+        return {slot: seeding.np_random(int(value))[0] for slot, value in enumerate(seeds) if value is not None}
 
     def _info(self) -> dict[str, Any]:
         """Return the infos of `ToolEnv`, merged as `VectorEnv` merges them: masks have the prefix `_`."""
@@ -279,14 +262,3 @@ class ToolVectorEnv(VectorEnv[Any, Any, Any]):
         if ended.any():
             info |= {"success": ended & episodes.simulator.success, "_success": ended.copy()}
         return info
-
-
-def _given(instance: Any, task: Task, count: int) -> Floats:
-    """Return `instance`, (I,) for all or (count, I), as (count, I) values."""
-    size = task.instance_space.size
-    values = np.asarray(instance, dtype=np.float64)
-    if values.shape not in ((size,), (count, size)):
-        raise ValueError(
-            f"options['instance'] has shape {values.shape}, not ({size},): {', '.join(task.instance_space.names)}"
-        )
-    return np.broadcast_to(values, (count, size)).copy()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
-from codesign_bench.registry import load, names
+from codesign_bench.registry import load, names, usable
 from codesign_bench.task.robot import DeploymentSpec
 from codesign_bench.task.task import Task
 
@@ -13,9 +16,14 @@ def task_names() -> tuple[str, ...]:
     return names("tasks")
 
 
+def usable_tasks(given: Iterable[str], log: Log = silent) -> list[str]:
+    """Return those of the given tasks that can be used in this Python; log the others, a line for each reason."""
+    return usable(given, load_task, log)
+
+
 def deployable_tasks() -> tuple[str, ...]:
-    """Return the names of the tasks that can be deployed on an arm."""
-    return tuple(name for name in task_names() if load_task(name).deployment is not None)
+    """Return the names of the tasks that can be deployed on an arm in this Python."""
+    return tuple(name for name in usable_tasks(task_names()) if load_task(name).deployment is not None)
 
 
 def deployment_of(task: Task) -> DeploymentSpec:
@@ -34,6 +42,7 @@ def load_task(name: str) -> Task:
 
     Raises:
         UserError: there is no such task.
+        UnavailableError: it cannot be used in this Python.
     """
     task: Task = load("tasks", name, Task)()
     return task

@@ -45,6 +45,9 @@ def play(episodes: Episodes, behaviour: Behaviour, instances: Floats, observe: O
         behaviour: designs and acts; its designs and controls are clipped to [-1, 1].
         instances: in the instance space's units.
         observe: gives `behaviour` its observations in the control phase; None: the unchanged ones.
+
+    Raises:
+        ValueError: the behaviour's designs or controls have another shape or are not finite.
     """
     count, see = len(instances), observe or _as_it_is
     slots = np.arange(count)
@@ -55,10 +58,10 @@ def play(episodes: Episodes, behaviour: Behaviour, instances: Floats, observe: O
     step = 0
     while slots.size:
         step += 1
-        controls = np.clip(np.asarray(behaviour.act(see(episodes, slots)), dtype=np.float64), -1.0, 1.0)
+        controls = np.asarray(behaviour.act(see(episodes, slots)), dtype=np.float64)
         reward, terminated, truncated = episodes.control(slots, controls)
         over = terminated | truncated
-        yield Turn(step, slots, controls, reward, over)
+        yield Turn(step, slots, np.clip(controls, -1.0, 1.0), reward, over)
         slots = slots[~over]
 
 

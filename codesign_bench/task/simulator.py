@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from codesign_bench.task.checks import NotCopied
 from codesign_bench.task.spaces import Booleans, Floats, Frame, Singles, Slots
 from codesign_bench.task.tool import ToolPart
 
@@ -48,12 +49,12 @@ class Soundness:
     """Whether rounding errors decide single episodes, because many bodies are in contact."""
 
 
-class Simulator(ABC):
+class Simulator(NotCopied, ABC):
     """Many independent episodes of one task in one process; slot `i` holds one episode.
 
     A call changes only the slots that it is given. What happens in a slot depends only on the calls to this slot since
     its `begin`. An episode is therefore the same in any batch, and in a new simulator or a used one: simulators are
-    reused.
+    reused. They cannot be copied or pickled.
     """
 
     def __init__(self, num_slots: int, state_size: int) -> None:

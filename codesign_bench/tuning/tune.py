@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -12,10 +13,11 @@ from codesign_bench.cell.cell import resolve_cells
 from codesign_bench.config.resolve import resolve
 from codesign_bench.console import Log, print_table, printer
 from codesign_bench.errors import UserError
-from codesign_bench.method import load_method
+from codesign_bench.method import load_method, usable_methods
 from codesign_bench.study.study import Study
 from codesign_bench.study.tuning import FIRST_REPORTED_SEED, Tuning
 from codesign_bench.sweep.runner import EXIT_ALL_DONE, run_sweep
+from codesign_bench.task import usable_tasks
 from codesign_bench.tuning.results import TABLE_FILE, WINNERS_FILE, spent, write_table, write_winners
 from codesign_bench.tuning.scores import Score, score, survivors
 from codesign_bench.tuning.settings import cells_in_turn, settings_of
@@ -30,6 +32,18 @@ def tuning_of(study: Study) -> Tuning:
     if study.tuning is None:
         raise UserError(f"the study '{study.name}' has no tuning; see docs/tuning.md")
     return study.tuning
+
+
+def usable_part(tuning: Tuning, log: Log) -> Tuning:
+    """Return the search of the tasks and methods that can be used in this Python; log what is left out.
+
+    Raises:
+        UserError: nothing is left.
+    """
+    tasks, methods = usable_tasks(tuning.tasks, log), usable_methods(tuning.methods, log)
+    if not tasks or not methods:
+        raise UserError("no task and method of the search can be used in this Python")
+    return replace(tuning, tasks=tuple(tasks), methods=tuple(methods))
 
 
 def print_plan(console: Console, tuning: Tuning, profile: str, steps: int | None) -> None:
@@ -67,6 +81,7 @@ def tune(
     retry_failed: bool = False,
     backend: str = "loky",
     scheduler: str | None = None,
+    same_code: bool = False,
 ) -> int:
     """Run the missing cells of the search and write its files; return 0, or 1 if some cell failed.
 
@@ -76,7 +91,8 @@ def tune(
         UserError: bad input, or a stored cell with another configuration.
         KeyboardInterrupt: the user stopped the search.
     """
-    tuning, log, code = tuning_of(study), printer(console), EXIT_ALL_DONE
+    log, code = printer(console), EXIT_ALL_DONE
+    tuning = usable_part(tuning_of(study), log)
     budgets = {task: budgets_of(tuning, task, profile, steps) for task in tuning.tasks}
     sweep = partial(
         run_sweep,
@@ -86,6 +102,7 @@ def tune(
         retry_failed=retry_failed,
         backend=backend,
         scheduler=scheduler,
+        same_code=same_code,
     )
     alive = [
         setting

@@ -79,7 +79,7 @@ def test_parameters_count_in_widths_of_their_ranges() -> None:
 
 
 def test_a_task_that_is_not_known_is_lacking() -> None:
-    with pytest.raises(InsufficientData, match="'push' is unknown"):
+    with pytest.raises(InsufficientData, match="'push' is unknown, or cannot be used"):
         found(VARY, Evidence(evaluations=designs([(0.0,)] * 3).evaluations))
 
 

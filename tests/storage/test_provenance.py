@@ -10,6 +10,7 @@ import pytest
 
 from builders import store_cell
 from codesign_bench.cell.variant import Variant
+from codesign_bench.member_code import MemberCode
 from codesign_bench.storage.cells import find_cells
 from codesign_bench.storage.provenance import (
     HEADING,
@@ -68,6 +69,14 @@ def test_each_kind_of_difference_is_a_line_with_the_cells_of_each_value() -> Non
     ]
 
 
+def test_packages_of_other_members_are_compared_where_they_are_recorded() -> None:
+    first, second = ({"sticks": code_of} for code_of in (CODE, OTHER))
+    assert lines(record(), record(packages=first), record(packages=first, seed=1)) == []
+    assert lines(record(), record(packages=first), record("scoop", packages=second)) == [
+        "commits of sticks: aaaaaaaaaaaa (1 cell of push), bbbbbbbbbbbb (1 cell of scoop)"
+    ]
+
+
 def test_cells_are_told_by_what_separates_them_or_else_counted() -> None:
     assert lines(record(), record(seed=1, code=OTHER)) == ["commits: aaaaaaaaaaaa (1 cell), bbbbbbbbbbbb (1 cell)"]
     varied = record(code=OTHER, variant=Variant.of(alpha=0.3))
@@ -101,12 +110,20 @@ def test_code_without_a_commit_is_told_by_its_fingerprint() -> None:
         ({"code": OTHER}, False),
         ({"host": {**HOST, "instruction_sets": []}}, False),
         ({"versions": {**VERSIONS, "numpy": "1.26.4"}}, False),
+        ({"packages": {"sticks": OTHER}}, False),
+        ({"packages": {"balls": OTHER}}, True),
+        ({"packages": {"sticks": {**CODE, "commit": "c" * 40}}}, True),
+        ({"packages": {}, "members": {}}, True),
+        ({"members": {"task": MemberCode("sticks.reach", "sticks", {"sticks.reach": "2"})}}, False),
     ],
 )
 def test_conditions_are_the_same_if_nothing_differs_that_can_change_numbers(
     changes: dict[str, Any], same: bool
 ) -> None:
-    assert same_conditions(record().conditions, record(**changes).conditions) == same
+    own = MemberCode("sticks.reach", "sticks", {"sticks.reach": "1"})
+    begun = record(packages={"sticks": CODE}, members={"task": own})
+    resumed = replace(begun, **changes)
+    assert same_conditions(begun.conditions, resumed.conditions) == same
 
 
 def test_only_finished_cells_count(tmp_path: Path) -> None:

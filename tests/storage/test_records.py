@@ -12,6 +12,7 @@ from builders import BUDGET, store_cell
 from codesign_bench.cell.variant import Variant
 from codesign_bench.config.settings import Sourced, StoredConfig
 from codesign_bench.errors import UserError
+from codesign_bench.member_code import MemberCode
 from codesign_bench.storage.records import DONE, FAILED, CellRecord, Failure, Timings
 
 VERSION_0_1_0: dict[str, Any] = {
@@ -54,6 +55,8 @@ def test_a_record_is_read_as_it_was_written(tmp_path: Path) -> None:
         config=BUDGET,
         versions={"torch": "2.13.0", "pybullet": None},
         code={"version": "0.2.0", "commit": None, "changed": None, "fingerprint": "1f"},
+        packages={"sticks": {"version": "1.0", "commit": None, "changed": None, "fingerprint": "2f"}},
+        members={"task": MemberCode("sticks.reach", "sticks", {"sticks.reach": "3f"})},
         host={"threads": 3},
         earlier=({"code": {}, "versions": {}, "host": {"cpu": "some CPU"}},),
         pid=5,
@@ -79,7 +82,8 @@ def test_a_record_of_version_0_1_0_is_read_with_the_axes_that_it_had() -> None:
         Failure("it broke", "Traceback\nValueError: it broke"),
     )
     assert (record.code, record.earlier) == ({}, ())
-    assert record.conditions == {"code": {}, "versions": VERSION_0_1_0["versions"], "host": VERSION_0_1_0["host"]}
+    unknown: dict[str, Any] = {"code": {}, "packages": {}, "members": {}}
+    assert record.conditions == {**unknown, "versions": VERSION_0_1_0["versions"], "host": VERSION_0_1_0["host"]}
     older = CellRecord.from_json({**VERSION_0_1_0, "finetune": 2, "alpha": None, "label": ""})
     assert older.variant == Variant.of(finetune=2)
     assert older.label == "gnn_ppo"
@@ -99,6 +103,12 @@ def test_a_record_of_version_0_1_0_is_read_with_the_axes_that_it_had() -> None:
         ({"label": "\udcff"}, "'label' has half a character"),
         ({"host": {"threads": "two"}}, "'threads' is not an integer"),
         ({"timings": {"wall_s": float("nan")}}, "'wall_s' is not a finite number"),
+        ({"packages": ["sticks"]}, "'packages' is not an object"),
+        (
+            {"members": {"task": {"module": "sticks", "package": "sticks", "files": "sticks"}}},
+            "'files' is not an object",
+        ),
+        ({"members": {"task": {"module": "sticks"}}}, "no 'files'"),
         ({"task": 5}, "'task' is not text"),
         ({"timings": {"yesterday": 1}}, "yesterday"),
         ({"alpha": True}, "axis 'alpha' is a bool"),

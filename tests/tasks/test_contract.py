@@ -19,7 +19,7 @@ from codesign_bench.cell.axes import FINE_TUNING_INSTANCES
 from codesign_bench.errors import UserError
 from codesign_bench.method import Problem
 from codesign_bench.registry import presented
-from codesign_bench.task import Booleans, Floats, Singles, Task, load_task, task_names
+from codesign_bench.task import Booleans, Floats, Singles, Slots, Task, load_task, task_names
 from codesign_bench.task.behaviours import RandomBehaviour
 from codesign_bench.task.episodes import TRADEOFF_TERM, Episodes, Tradeoff
 from codesign_bench.task.play import Turn
@@ -226,6 +226,45 @@ def test_actions_that_are_not_finite_are_refused(task: Task, bad: float) -> None
     episodes.design(slots, script.designs)
     with pytest.raises(ValueError, match="not finite"):
         episodes.control(slots, np.full_like(script.controls[0], bad))
+
+
+def test_refused_calls_change_nothing(task: Task) -> None:
+    script, slots = script_for(task, steps=5), np.arange(EPISODES)
+    wrong = [np.nan, np.inf, -np.inf]
+
+    class Disturbed(Episodes):
+        """Episodes of which every call comes after calls of its kind that are refused."""
+
+        def begin(self, slots: Slots, instances: Floats) -> None:
+            """Begin, at last."""
+            others = [np.append(slots[1:], -1), np.append(slots[1:], self.num_slots), slots[[0] * len(slots)]]
+            for bad, where in [*((bad, slots) for bad in worse(instances)), *((instances, other) for other in others)]:
+                with pytest.raises(ValueError, match=r"instance|slots"):
+                    super().begin(where, bad)
+            super().begin(slots, instances)
+
+        def design(self, slots: Slots, unit_designs: Floats) -> None:
+            """Design, at last."""
+            for bad in worse(unit_designs):
+                with pytest.raises(ValueError, match="design"):
+                    super().design(slots, bad)
+            super().design(slots, unit_designs)
+
+        def control(self, slots: Slots, controls: Floats) -> tuple[Floats, Booleans, Booleans]:
+            """Control, at last."""
+            for bad in worse(controls):
+                with pytest.raises(ValueError, match="control"):
+                    super().control(slots, bad)
+            return super().control(slots, controls)
+
+    def worse(values: Floats) -> list[Floats]:
+        """Return values of wrong shapes, and with values that are not finite in the last row."""
+        shapes = [values[0], values[:1, :1], values[:, :1], values[:-1], np.vstack([values, values]), values[None]]
+        last = np.arange(len(values)) == len(values) - 1
+        fitting = [np.where(last[:, None], bad, values) for bad in wrong]
+        return [*(part for part in shapes if part.shape != values.shape), *fitting]
+
+    assert_equal(play(Episodes(task, EPISODES), script, slots), play(Disturbed(task, EPISODES), script, slots))
 
 
 def test_extreme_actions_act_like_the_bounds(task: Task) -> None:

@@ -18,7 +18,7 @@ from codesign_bench.method import load_method
 from codesign_bench.studies.corl2023.learners import LEARNERS
 from codesign_bench.studies.corl2023.members import METHODS, OURS, TASKS
 from codesign_bench.studies.corl2023.scenes import SCENES, UNUSED
-from codesign_bench.task import load_task
+from codesign_bench.task import load_task, usable_tasks
 from codesign_bench.task.scene import Constant, by_row
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def hyperparameters_of_results(request: Request) -> pd.DataFrame:
         UserError: the results have none of the paper's tasks.
     """
     present = TASKS if request.named else tasks_in(request.results)
-    return hyperparameters(METHODS, [task for task in TASKS if task in present])
+    return hyperparameters(METHODS, usable_tasks([task for task in TASKS if task in present], request.log))
 
 
 def as_text(value: Any) -> str:

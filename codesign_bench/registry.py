@@ -14,10 +14,8 @@ from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
 from typing import Any
 
-from codesign_bench.errors import unknown_name
-
-IMPORTS_VARIABLE = "CODESIGN_BENCH_IMPORTS"
-"""Environment variable through which `--import module` reaches the worker processes (module names, comma-separated)."""
+from codesign_bench.errors import UserError, in_one_line, unknown_name
+from codesign_bench.startup import IMPORTS_VARIABLE as IMPORTS_VARIABLE  # a part of this module, too
 
 KINDS = {"methods": "method", "tasks": "task", "paper_figs": "figure", "studies": "study"}
 """The groups of members, and the singular that messages use for each."""
@@ -55,13 +53,13 @@ def load(group: str, name: str, base: type) -> Any:
     """Return the public subclass of `base` that the entry `name` of `group` defines.
 
     Raises:
-        UserError: no entry has this name.
+        UserError: no entry has this name, or the package that adds it cannot be imported.
         TypeError: its file does not define exactly one public subclass of `base`.
     """
     if name in _files(group):
         return single_subclass(importlib.import_module(f"codesign_bench.{group}.{name}"), base)
     if name in _entry_points(group):
-        loaded = _entry_points(group)[name].load()
+        loaded = _loaded(group, name)
         return single_subclass(loaded, base) if isinstance(loaded, ModuleType) else loaded
     if name in _registered.get(group, {}):
         return _registered[group][name]()
@@ -72,13 +70,13 @@ def load_module(group: str, name: str) -> ModuleType:
     """Return the module of the entry `name` of `group` (figures and studies are modules, not classes).
 
     Raises:
-        UserError: no entry has this name.
+        UserError: no entry has this name, or the package that adds it cannot be imported.
         TypeError: the entry is not a module.
     """
     if name in _files(group):
         return importlib.import_module(f"codesign_bench.{group}.{name}")
     if name in _entry_points(group):
-        found = _entry_points(group)[name].load()
+        found = _loaded(group, name)
     elif name in _registered.get(group, {}):
         found = _registered[group][name]()
     else:
@@ -92,7 +90,7 @@ def load_attribute(group: str, name: str, attribute: str) -> Any:
     """Return an attribute of the module of the entry `name` of `group`.
 
     Raises:
-        UserError: no entry has this name.
+        UserError: no entry has this name, or the package that adds it cannot be imported.
         TypeError: its module lacks the attribute.
     """
     module = load_module(group, name)
@@ -132,3 +130,13 @@ def _order(group: str) -> tuple[str, ...]:
 
 def _entry_points(group: str) -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=f"codesign_bench.{group}")}
+
+
+def _loaded(group: str, name: str) -> Any:
+    """Return what another package adds under a name; the fault of its import becomes an error in one line."""
+    point = _entry_points(group)[name]
+    try:
+        return point.load()
+    except Exception as error:
+        package = f" of the package {point.dist.name}" if point.dist is not None else ""
+        raise UserError(f"the {KINDS[group]} '{name}'{package} cannot be imported: {in_one_line(error)}") from error

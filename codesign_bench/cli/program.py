@@ -11,11 +11,22 @@ from typing import NoReturn
 from rich.console import Console
 
 from codesign_bench import __version__
+from codesign_bench.cli.arguments import module_name
+from codesign_bench.console import steady_streams
 from codesign_bench.errors import UserError
 from codesign_bench.plugins import import_modules
+from codesign_bench.processes import keep_modules_of_children_safe
+from codesign_bench.startup import (
+    EXIT_INTERRUPTED,
+    PROGRAM,
+    end_quietly_on_interrupt,
+    is_program,
+    raise_on_interrupt,
+)
 
-PROGRAM = "codesign-bench"
-EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
+EXIT_BAD_INPUT = 2
+LONGEST_LINE = 1_000
+"""Characters; a longer line of a message loses its middle."""
 COMMANDS = (
     "list",
     "show",
@@ -39,30 +50,45 @@ class _Parser(argparse.ArgumentParser):
     """An argument parser that reports bad input in two lines."""
 
     def error(self, message: str) -> NoReturn:
-        print(f"{self.prog}: {' '.join(message.split())}\nsee: {self.prog} --help", file=sys.stderr)
+        told = in_few_lines(" ".join(message.split()) or "bad input")
+        print(f"{self.prog}: {told}\nsee: {self.prog} --help", file=sys.stderr)
         raise SystemExit(EXIT_BAD_INPUT)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code."""
+    keep_modules_of_children_safe()
+    with steady_streams(PROGRAM):
+        try:
+            return _run(arguments)
+        except KeyboardInterrupt:
+            print("\ninterrupted; the same command resumes", file=sys.stderr)
+            return EXIT_INTERRUPTED
+        finally:
+            if is_program():
+                end_quietly_on_interrupt()
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
         options = build_parser().parse_args(arguments)
     except SystemExit as stop:  # --help, --version and bad input
         return stop.code if isinstance(stop.code, int) else EXIT_BAD_INPUT
-    console = Console()
     try:
-        _extend_path(options.imports)
         import_modules(options.imports)
-        return int(options.command(options, console))
+        raise_on_interrupt()  # from here on there may be something to save
+        return int(options.command(options, Console()))
     except UserError as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        print(f"{PROGRAM}: {in_few_lines(str(error))}", file=sys.stderr)
         return EXIT_BAD_INPUT
-    except KeyboardInterrupt:
-        print("\ninterrupted; the same command resumes", file=sys.stderr)
-        return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader of the output, e.g. `head`, has closed the pipe
-        sys.stderr.close()
-        return 0
+
+
+def in_few_lines(text: str) -> str:
+    """Return a message of at most two lines without control characters, whatever a user's words in it contain."""
+    first, *others = "".join(letter if letter.isprintable() or letter == "\n" else " " for letter in text).splitlines()
+    lines = [first, " ".join(others)] if others else [first]
+    half = LONGEST_LINE // 2
+    return "\n".join(line if len(line) <= LONGEST_LINE else f"{line[:half]} ... {line[-half:]}" for line in lines)
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -79,6 +105,7 @@ def build_parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--import",
             dest="imports",
+            type=module_name,
             metavar="MODULE",
             action="append",
             default=[],
@@ -86,9 +113,3 @@ def build_parser() -> argparse.ArgumentParser:
         )
         module.add_arguments(command)
     return parser
-
-
-def _extend_path(imports: Sequence[str]) -> None:
-    """Make `--import` find modules in the working folder, as `python -m` does."""
-    if imports and "" not in sys.path:
-        sys.path.insert(0, "")

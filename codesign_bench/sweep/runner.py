@@ -15,7 +15,7 @@ from codesign_bench.cell.cell import Cell, ResolvedCell
 from codesign_bench.console import Log, printer
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores
-from codesign_bench.registry import IMPORTS_VARIABLE
+from codesign_bench.startup import IMPORTS_VARIABLE
 from codesign_bench.storage.checkpoint import check_checkpoint
 from codesign_bench.storage.layout import CHECKPOINT_FILE, CURVE_FILE, is_locked, open_folder
 from codesign_bench.storage.records import DONE, FAILED, CellRecord

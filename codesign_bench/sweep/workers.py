@@ -16,7 +16,7 @@ import filelock
 from codesign_bench.cell.cell import Cell
 from codesign_bench.errors import UserError
 from codesign_bench.processes import end_with, thread_environment
-from codesign_bench.registry import IMPORTS_VARIABLE
+from codesign_bench.startup import IMPORTS_VARIABLE
 from codesign_bench.storage.layout import LOG_FILE, PROGRESS_FILE, cell_lock, is_locked
 from codesign_bench.storage.records import DONE, FAILED, RUNNING, CellRecord, Failure
 from codesign_bench.sweep import cell_process
@@ -24,10 +24,10 @@ from codesign_bench.sweep import cell_process
 BUSY = "busy"
 """The outcome of a cell that another sweep is running."""
 START = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); "
+    "import sys; sys.path[:] = filter(None, sys.path); import json; sys.path[:] = json.loads(sys.argv.pop(1)); "
     "from codesign_bench.sweep.cell_process import start; start()"
 )
-"""Starts a cell's process with this process's module path, independent of the working folder."""
+"""Starts a cell's process with this process's module path; nothing is imported from the working folder."""
 SETTLE_SECONDS = 1.0
 
 
@@ -80,7 +80,8 @@ def run_job(job: Job) -> Outcome:
 
 
 def _run_process(job: Job, folder: Path) -> int:
-    command = [sys.executable, "-c", START, json.dumps(sys.path), job.cell.to_json(), job.out]
+    path = [entry for entry in sys.path if entry]  # an empty entry is the working folder
+    command = [sys.executable, "-c", START, json.dumps(path), job.cell.to_json(), job.out]
     with open(folder / LOG_FILE, "wb") as log:
         process = subprocess.Popen(
             [*command, *(["retry"] if job.retry_failed else [])],

@@ -108,8 +108,8 @@ def test_fine_tuning_without_a_finished_default_cell_says_what_to_run(tmp_path: 
 @pytest.mark.parametrize(
     ("values", "named"),
     [
-        ({"cutout": 1.0}, r"--cutout must be between 0 and 1 \(both excluded\), not 1"),
-        ({"alpha": -0.1}, "--alpha must be between 0 and 1, not -0.1"),
+        ({"cutout": 1.0}, "--cutout must be a number above 0 to below 1, not 1"),
+        ({"alpha": -0.1}, "--alpha must be a number from 0 to 1, not -0.1"),
         ({"scratch": 3}, "--scratch 3: task 'toy_reach' has fine-tuning places 1 to 2"),
         ({"finetune": 0}, "--finetune 0: task 'toy_reach' has fine-tuning places 1 to 2"),
         ({"setting": -1}, "--variant setting=-1: must not be negative"),

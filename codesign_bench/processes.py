@@ -31,6 +31,18 @@ def keep_modules_of_children_safe() -> None:
     os.environ[SAFE_PATH_VARIABLE] = "1"
 
 
+def existing_folder() -> str | None:
+    """Return the folder in which a process can start: the root if the working folder was deleted, else None (here).
+
+    Numerical libraries end a process that has no working folder.
+    """
+    try:
+        os.getcwd()
+    except OSError:
+        return os.sep
+    return None
+
+
 def end_with(parent_pid: int) -> None:
     """End this process soon after its parent ends for any reason: an orphan would only keep a core busy."""
 

@@ -42,7 +42,7 @@ class Axis:
         try:
             check_value(self.kind, value)
         except ValueError as error:
-            raise UserError(f"--{self.name} must be {error}, not {value}") from error
+            raise UserError(f"--variant {self.name}={value}: expected {error}") from error
 
     def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
         """Return the learning problem of the cell's method."""

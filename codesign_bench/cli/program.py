@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import NoReturn
 
 from rich.console import Console
@@ -15,7 +17,7 @@ from codesign_bench.cli.arguments import module_name
 from codesign_bench.console import steady_streams
 from codesign_bench.errors import UserError
 from codesign_bench.plugins import import_modules
-from codesign_bench.processes import keep_modules_of_children_safe
+from codesign_bench.processes import existing_folder, keep_modules_of_children_safe
 from codesign_bench.startup import (
     EXIT_INTERRUPTED,
     PROGRAM,
@@ -75,12 +77,26 @@ def _run(arguments: Sequence[str] | None) -> int:
     except SystemExit as stop:  # --help, --version and bad input
         return stop.code if isinstance(stop.code, int) else EXIT_BAD_INPUT
     try:
+        _leave_deleted_folder(options)
         import_modules(options.imports)
         raise_on_interrupt()  # from here on there may be something to save
         return int(options.command(options, Console()))
     except UserError as error:
         print(f"{PROGRAM}: {in_few_lines(str(error))}", file=sys.stderr)
         return EXIT_BAD_INPUT
+
+
+def _leave_deleted_folder(options: argparse.Namespace) -> None:
+    """Go to the root if the working folder was deleted, for libraries do not work without one.
+
+    Raises:
+        UserError: it was, and a path is given relative to it.
+    """
+    if (root := existing_folder()) is not None:
+        for name, value in vars(options).items():
+            if isinstance(value, Path) and not value.is_absolute():
+                raise UserError(f"the working folder was deleted: give --{name} as an absolute path, not {value}")
+        os.chdir(root)
 
 
 def in_few_lines(text: str) -> str:

@@ -15,7 +15,7 @@ import filelock
 
 from codesign_bench.cell.cell import Cell
 from codesign_bench.errors import UserError
-from codesign_bench.processes import end_with, thread_environment
+from codesign_bench.processes import end_with, existing_folder, thread_environment
 from codesign_bench.startup import IMPORTS_VARIABLE
 from codesign_bench.storage.layout import LOG_FILE, PROGRESS_FILE, cell_lock, is_locked
 from codesign_bench.storage.records import DONE, FAILED, RUNNING, CellRecord, Failure
@@ -29,6 +29,8 @@ START = (
 )
 """Starts a cell's process with this process's module path; nothing is imported from the working folder."""
 SETTLE_SECONDS = 1.0
+STOPPING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+"""Signals by which people and clusters stop a process."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ def _run_process(job: Job, folder: Path) -> int:
             stdin=subprocess.PIPE,  # never written to; it closes when the parent dies, which ends the process
             stdout=log,
             stderr=log,
+            cwd=existing_folder(),
             env={**thread_environment(), IMPORTS_VARIABLE: job.imported},
         )
         try:
@@ -108,6 +111,8 @@ def _record_death(folder: Path, code: int) -> str:
     # If the whole process tree is being killed, this process also dies now: then the cell is interrupted, not failed.
     time.sleep(SETTLE_SECONDS)
     message = describe_exit(code)
+    if -code in STOPPING:  # whoever asked it to stop did not say that the cell is bad: it is interrupted, not failed
+        return f"{message}; the same command resumes it"
     try:
         with cell_lock(folder).acquire(timeout=0):
             record = CellRecord.read(folder)

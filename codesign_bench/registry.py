@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
@@ -97,6 +97,21 @@ def load_attribute(group: str, name: str, attribute: str) -> Any:
     if not hasattr(module, attribute):
         raise TypeError(f"{module.__name__} is registered as a {KINDS[group]} and must define {attribute}")
     return getattr(module, attribute)
+
+
+def load_all(group: str, attribute: str) -> Iterator[tuple[str, Any]]:
+    """Yield each name of `group` with an attribute of its module; what cannot be loaded is left out.
+
+    Nobody asked for those by name, so a faulty package must not end what does not need it; `list` tells what is wrong.
+    """
+    for name in names(group):
+        try:
+            found = load_attribute(group, name, attribute)
+        except (UserError, TypeError):
+            if name in _files(group):
+                raise
+            continue
+        yield name, found
 
 
 def single_subclass(module: ModuleType, base: type) -> Any:

@@ -15,7 +15,7 @@ from codesign_bench.config.run_settings import VALIDATION, RunSettings
 from codesign_bench.config.values import Share, Within, check_value, parse_value, printable
 from codesign_bench.errors import UserError, unknown_name
 from codesign_bench.method import Problem
-from codesign_bench.registry import load_attribute, names
+from codesign_bench.registry import load_all
 from codesign_bench.task import Task
 from codesign_bench.task.episodes import Tradeoff
 
@@ -190,7 +190,7 @@ def axis_named(name: str) -> Axis:
 
 def axes() -> dict[str, Axis]:
     """Return all axes by name: the built-in ones, then those of every study."""
-    added = (axis for study in names("studies") for axis in load_attribute("studies", study, "STUDY").axes)
+    added = (axis for _, study in load_all("studies", "STUDY") for axis in study.axes)
     return {**BUILT_IN, **OF_TUNING, **{axis.name: axis for axis in added}}
 
 

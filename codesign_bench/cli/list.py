@@ -8,6 +8,7 @@ from rich.console import Console
 
 from codesign_bench.config.profiles import profiles
 from codesign_bench.console import printer
+from codesign_bench.errors import UserError
 from codesign_bench.registry import names
 from codesign_bench.study import DEFAULT_STUDY, load_study, study_names
 
@@ -31,10 +32,18 @@ def run(options: argparse.Namespace, console: Console) -> int:
         for name in names(group):
             log(f"  {name}")
     for title, entries in (
-        ("studies", [(name, load_study(name).title) for name in study_names()]),
+        ("studies", [(name, _title(name)) for name in study_names()]),
         ("profiles", [(profile.name, profile.help) for profile in profiles().values()]),
     ):
         log(title)
         for name, text in entries:
             log(f"  {name:8} {text}")
     return 0
+
+
+def _title(study: str) -> str:
+    """Return the title of a study, or why it cannot be imported."""
+    try:
+        return load_study(study).title
+    except UserError as error:
+        return str(error)

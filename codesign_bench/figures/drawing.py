@@ -9,7 +9,9 @@ curves), `NEEDS`, the command that makes what it shows, `texts(frame)`, further 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator, Mapping, Sequence
+import io
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -17,15 +19,15 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from codesign_bench.console import Log
-from codesign_bench.errors import UserError
+from codesign_bench.console import Log, silent
+from codesign_bench.errors import UserError, in_one_line
 from codesign_bench.figures.comparison import made_otherwise, with_compared
 from codesign_bench.figures.source import Request, Source, curves
-from codesign_bench.registry import load_module, names
+from codesign_bench.registry import built_in, load_all, load_module, names
 from codesign_bench.storage.files import write_bytes
 from codesign_bench.storage.frames import load_results
 from codesign_bench.storage.tables import csv_bytes
-from codesign_bench.study.study import DEFAULT_STUDY, Study, load_study, study_names
+from codesign_bench.study.study import DEFAULT_STUDY, Study, load_study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,21 +69,23 @@ def draw_figures(
     Raises:
         UserError: an unknown figure, a folder that is not writable, or no figure can be drawn.
     """
-    modules = {name: load_module("paper_figs", name) for name in wanted or figure_names(study)}
+    request = Request(results, log, named=bool(wanted))
+    modules = _modules(wanted or figure_names(study), request)
     if compare is not None and not any(getattr(module, "COMPARES", False) for module in modules.values()):
-        known = {name: load_module("paper_figs", name) for name in names("paper_figs")}
+        known = _modules(names("paper_figs"), Request(results, silent))
         choices = [name for name, module in known.items() if getattr(module, "COMPARES", False)]
         raise UserError(f"--compare: {', '.join(wanted)} show no curves; choose from: {', '.join(choices)}")
     if not wanted and not results.is_dir():
         raise UserError(f"no results folder '{results}'; create one with: codesign-bench run --out {results}")
     if compare is not None:
         load_results(compare)  # a wrong folder is an error, not a reason to leave the curves out
-    make_folder(out)
     drawn: list[Path] = []
-    for drawing in _drawings(modules, Request(results, log, named=bool(wanted)), compare):
-        drawn = [*save(drawing, out), *drawn]  # the first figure is logged last
-    if not drawn:
-        raise UserError(f"nothing in '{results}' can be plotted yet")
+    with removed_if_refused(out):
+        make_folder(out)
+        for drawing in _drawings(modules, request, compare):
+            drawn = [*save(drawing, out), *drawn]  # the first figure is logged last
+        if not drawn:
+            raise UserError(f"nothing in '{results}' can be plotted yet")
     for line in made_otherwise(results, compare) if compare is not None else ():
         log(line)
     for path in sorted(drawn, key=lambda path: path.suffix == ".png"):
@@ -91,14 +95,15 @@ def draw_figures(
 def figure_names(study: Study | None) -> list[str]:
     """Return the figures of a study (None: the default one), and those that belong to no study."""
     chosen = load_study(DEFAULT_STUDY) if study is None else study
-    of_others = {name for other in study_names() if other != chosen.name for name in load_study(other).figures}
+    others = [other for name, other in load_all("studies", "STUDY") if name != chosen.name]
+    of_others = {name for other in others for name in other.figures}
     return [name for name in names("paper_figs") if name in chosen.figures or name not in of_others]
 
 
 def possible_drawings(results: Path, log: Log, study: Study | None = None) -> Iterator[Drawing]:
     """Yield every figure of a study that can be drawn; `log` gets those that are left out, and why."""
-    modules = {name: load_module("paper_figs", name) for name in figure_names(study)}
-    return _drawings(modules, Request(results, log))
+    request = Request(results, log)
+    return _drawings(_modules(figure_names(study), request), request)
 
 
 def save(drawing: Drawing, out: Path) -> list[Path]:
@@ -112,6 +117,36 @@ def save(drawing: Drawing, out: Path) -> list[Path]:
         paths.insert(0, out / f"{drawing.name}.{ending}")
         write_bytes(paths[0], text.encode())
     return paths
+
+
+def _modules(wanted: Iterable[str], request: Request) -> dict[str, ModuleType]:
+    """Return the modules of figures; those of other packages that cannot be imported are left out and named.
+
+    Raises:
+        UserError: a figure that was requested by name is unknown, or cannot be imported.
+    """
+    modules = {}
+    for name in wanted:
+        try:
+            modules[name] = load_module("paper_figs", name)
+            _check_module(name, modules[name])
+        except (UserError, TypeError) as error:
+            modules.pop(name, None)
+            if request.named or name in built_in("paper_figs"):
+                raise
+            request.log(f"{name} left out: {error}")
+    return modules
+
+
+def _check_module(name: str, module: ModuleType) -> None:
+    """Check that a module has what a figure must have.
+
+    Raises:
+        TypeError: it has not.
+    """
+    lacking = [part for part in ("TITLE", "data", "draw") if not hasattr(module, part)]
+    if lacking:
+        raise TypeError(f"{module.__name__} is registered as the figure '{name}' and must define {', '.join(lacking)}")
 
 
 def _drawings(modules: Mapping[str, ModuleType], request: Request, compare: Path | None = None) -> Iterator[Drawing]:
@@ -130,11 +165,21 @@ def _drawings(modules: Mapping[str, ModuleType], request: Request, compare: Path
             if compare is not None and getattr(module, "COMPARES", False):
                 frame = with_compared(frame, compare)
             drawing = _draw(name, module, frame)
+            if name not in built_in("paper_figs"):
+                _check_drawing(drawing)
         except UserError as error:
             needs = f"; needs: {module.NEEDS}" if hasattr(module, "NEEDS") else ""
             if request.named:
                 raise UserError(f"{name}: {error}{needs}") from error
             request.log(f"{name} left out: {error}{needs}")
+            continue
+        except (
+            Exception,
+            SystemExit,
+        ) as error:  # of code that is not ours
+            if request.named or name in built_in("paper_figs"):
+                raise
+            request.log(f"{name} left out, for it has a fault: {in_one_line(error)}")
             continue
         yield drawing
         _close(drawing.figure)
@@ -159,11 +204,32 @@ def _draw(name: str, module: Any, frame: pd.DataFrame) -> Drawing:
     )
 
 
+def _check_drawing(drawing: Drawing) -> None:
+    """Save a drawing to nowhere, so that what is wrong with it shows while it can still be left out."""
+    csv_bytes(drawing.table)
+    drawing.figure.savefig(io.BytesIO(), format="png")
+    for text in drawing.texts.values():
+        text.encode()
+
+
 def _close(figure: Figure) -> None:
     """Free a figure that was made through pyplot, which would otherwise keep it."""
     import matplotlib.pyplot as plt
 
     plt.close(figure)
+
+
+@contextmanager
+def removed_if_refused(out: Path) -> Iterator[None]:
+    """Remove the folder `out` and those above it if they are new and empty when the `with` block ends with an error."""
+    new = [folder for folder in (out, *out.parents) if not folder.exists()]
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):  # one that is not empty stays, and those above it with it
+            for folder in new:
+                folder.rmdir()
+        raise
 
 
 def make_folder(out: Path) -> None:

@@ -17,7 +17,7 @@ from markupsafe import Markup, escape
 from codesign_bench.code_version import code_version
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
-from codesign_bench.figures.drawing import make_folder
+from codesign_bench.figures.drawing import make_folder, removed_if_refused
 from codesign_bench.stats import CELL_KEYS
 from codesign_bench.storage.files import write_bytes
 from codesign_bench.storage.frames import load_results
@@ -83,9 +83,10 @@ def write_report(results: Path, out: Path, log: Log, study: Study | None = None)
     if out.is_dir():
         raise UserError(f"--out {out}: is a folder; give a file in it, e.g. {out / 'report.html'}")
     cells, damaged = read_cells(results)
-    make_folder(out.parent)
-    page = gather(results, cells, damaged, study or load_study(DEFAULT_STUDY))
-    write_bytes(out, render(page).encode())
+    with removed_if_refused(out.parent):
+        make_folder(out.parent)
+        page = gather(results, cells, damaged, study or load_study(DEFAULT_STUDY))
+        write_bytes(out, render(page).encode())
     log(str(out))
 
 

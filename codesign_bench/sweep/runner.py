@@ -98,11 +98,11 @@ def run_sweep(
         UserError: bad input, found before anything runs.
         KeyboardInterrupt: the user stopped the sweep; its processes have ended, and the same call resumes it.
     """
-    open_folder(out)
     plan = make_plan(cells, out, retry_failed=retry_failed)
     threads = max((resolved.config.run.threads for resolved in cells), default=1)
     used_jobs, split = split_cores(available_cores(), len(plan.pending), threads, jobs)
     chosen = make_backend(backend, used_jobs, scheduler)
+    open_folder(out)  # once nothing else can be refused: a refused sweep leaves no folder behind
     say = printer(console)
     say(f"{len(cells)} cells, {len(plan.done)} of them already done; results in {out}")
     failures = dict(plan.failed)

@@ -13,6 +13,9 @@ PrecisionChoice: TypeAlias = Literal["fp32", "auto"]
 EVALUATION, VALIDATION = "evaluation", "validation"
 """Names of a task's two fixed sets of instances: for results that are reported, and for choosing settings."""
 Instances: TypeAlias = Literal["evaluation", "validation"]
+OVERSHOOT = 0.02
+"""Share of a budget by which the last batch may exceed it, since its episodes are finished. It is as long as the
+longest batch of the profile `laptop` may exceed the one wanted, so batches of usual budgets are not cut."""
 Steps: TypeAlias = Annotated[int, Within(1, 1_000_000_000_000)]
 Threads: TypeAlias = Annotated[int, Within(1, 4_096)]
 

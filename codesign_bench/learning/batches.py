@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from codesign_bench.config.run_settings import OVERSHOOT
 from codesign_bench.learning.explorer import Explorer
 from codesign_bench.learning.rollout import Collector
 from codesign_bench.learning.rollout_pool import Group, RolloutPool
@@ -17,9 +18,6 @@ from codesign_bench.learning.trajectories import Trajectories, joined
 from codesign_bench.method import Problem
 from codesign_bench.seeding import Streams
 
-OVERSHOOT = 0.02
-"""Share of a budget by which the last batch may exceed it, since its episodes are finished. It is large enough that no
-batch of the profiles `laptop` and `paper` is cut by it."""
 GROUP_SLOTS = 96
 """Fewest slots of a group, unless the batch has fewer: smaller calls of the policy cost more per step."""
 

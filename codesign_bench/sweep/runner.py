@@ -12,6 +12,7 @@ import pandas as pd
 from rich.console import Console
 
 from codesign_bench.cell.cell import Cell, ResolvedCell
+from codesign_bench.config.run_settings import OVERSHOOT
 from codesign_bench.console import Log, printer
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores
@@ -108,10 +109,11 @@ def run_sweep(
     failures = dict(plan.failed)
     if plan.pending:
         say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
+        say(f"cells finish their last episodes: at most {OVERSHOOT:.0%} over the budget, or one smallest batch")
         imported = os.environ.get(IMPORTS_VARIABLE, "")
         queue = [Job(resolved.cell, str(out), retry_failed, imported) for resolved in plan.pending]
         budgets = {resolved.cell: resolved.config.run.steps for resolved in plan.pending}
-        with chosen as workers, ProgressDisplay(console, out, budgets) as display:
+        with chosen as workers, ProgressDisplay(console, out, budgets, used_jobs) as display:
             failures |= _run_queue(queue, workers, display)
     return _conclude(say, len(cells), failures, plan.failed)
 
@@ -150,13 +152,21 @@ def _tell(outcome: Outcome, display: ProgressDisplay, failures: dict[Cell, str])
         failures[outcome.cell] = outcome.message
         display.say(f"failed  {outcome.cell.name}  {_one_line(outcome.message)}")
     else:
-        display.say(f"done    {outcome.cell.name}  {_last_row(outcome.cell, display.out)}")
+        display.say(
+            f"done    {outcome.cell.name}  {_last_row(outcome.cell, display.out, display.budgets[outcome.cell])}"
+        )
 
 
-def _last_row(cell: Cell, out: Path) -> str:
+def _last_row(cell: Cell, out: Path, budget: int) -> str:
     last = pd.read_csv(cell.folder(out) / CURVE_FILE).iloc[-1]
     outcome = f"return {last['return_mean']:.2f}, success {last['success_rate']:.2f}"
-    return f"{outcome}, {last['env_steps']:,.0f} steps, {last['wall_s']:.0f} s"
+    return f"{outcome}, {last['env_steps']:,.0f} steps{over(last['env_steps'], budget)}, {last['wall_s']:.0f} s"
+
+
+def over(env_steps: float, budget: int) -> str:
+    """Return by how much a cell has exceeded its budget to finish its last episodes, or nothing if by less than 1 %."""
+    share = env_steps / budget - 1.0
+    return f" ({share:.0%} over the budget)" if share >= 0.01 else ""
 
 
 def _refuse_other_configurations(

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from rich.console import Console
 
@@ -50,6 +50,12 @@ COMMANDS = (
 
 class _Parser(argparse.ArgumentParser):
     """An argument parser that reports bad input in two lines."""
+
+    def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
+        # argparse drops `--` even where it is all that an option is given, as in `--jobs=--`.
+        if action.option_strings and arg_strings and set(arg_strings) == {"--"}:
+            raise argparse.ArgumentError(action, "expected a value, not '--'")
+        return super()._get_values(action, arg_strings)
 
     def error(self, message: str) -> NoReturn:
         told = in_few_lines(" ".join(message.split()) or "bad input")

@@ -128,7 +128,7 @@ def axis_values(options: argparse.Namespace) -> dict[str, list[Value]]:
     values: dict[str, list[Value]] = {name: list(getattr(options, name)) for name in BUILT_IN}
     for text in options.variant:
         axis, equals, listed = text.partition("=")
-        if not equals or not listed:
+        if not axis or not equals or not listed:
             raise UserError(f"--variant {printable(text)}: write it as AXIS=VALUE or AXIS=VALUE,VALUE")
         values.setdefault(axis, []).extend(parse_axis_value(axis, value) for value in listed.split(","))
     return values

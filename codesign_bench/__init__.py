@@ -5,8 +5,13 @@ Importing the package imports no method, no simulator and no torch; its names ar
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from codesign_bench import startup
+
+startup.prepare()  # before any other import: it settles where modules come from
+
+# isort: split
+from importlib import import_module  # noqa: E402
+from typing import TYPE_CHECKING, Any  # noqa: E402
 
 if TYPE_CHECKING:
     from codesign_bench.errors import UserError

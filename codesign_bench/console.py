@@ -1,11 +1,13 @@
-"""Console output: lines, tables and the numbers in them."""
+"""Console output: lines, tables and the numbers in them, and streams that may stop being read at any time."""
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
-from typing import TypeAlias
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import Any, TypeAlias
 
 from rich.console import Console
 from rich.table import Table
@@ -63,3 +65,68 @@ def print_table(console: Console, headings: Sequence[str], table_rows: Sequence[
     for row in (headings, *table_rows):
         line = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip()
         console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+class SteadyStream:
+    """A text stream that never fails: what cannot be written is lost, and the program goes on.
+
+    So a sweep does not end because nobody reads its output any more, or because the disk behind it is full.
+    """
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+        self.fault: OSError | ValueError | None = None
+        """Why nothing is written any more."""
+
+    def write(self, text: str) -> int:
+        """Write `text`; characters that the stream's encoding does not have are written as escapes."""
+        try:
+            if self.fault is None:
+                self._stream.write(text)
+        except UnicodeEncodeError as error:
+            self.write(text.encode(error.encoding, "backslashreplace").decode(error.encoding))
+        except (OSError, ValueError) as error:
+            self._give_up(error)
+        return len(text)
+
+    def flush(self) -> None:
+        """Write what is buffered."""
+        try:
+            if self.fault is None:
+                self._stream.flush()
+        except (OSError, ValueError) as error:
+            self._give_up(error)
+
+    def _give_up(self, error: OSError | ValueError) -> None:
+        self.fault = error
+        try:  # What is still buffered goes nowhere, or Python would try to write it once more when it ends.
+            nothing = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nothing, self._stream.fileno())
+            os.close(nothing)
+        except (OSError, ValueError):
+            pass
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    @property
+    def loss(self) -> str:
+        """Why output was lost although somebody may still want it, or nothing."""
+        number = getattr(self.fault, "errno", None)
+        return "" if self.fault is None or number in (None, errno.EPIPE, errno.EBADF) else os.strerror(int(number or 0))
+
+
+@contextmanager
+def steady_streams(program: str) -> Iterator[None]:
+    """Make writing to standard output and standard error never fail; at the end, say once what was lost and why."""
+    before = sys.stdout, sys.stderr
+    output, errors = SteadyStream(sys.stdout), SteadyStream(sys.stderr)
+    sys.stdout, sys.stderr = output, errors
+    try:
+        yield
+    finally:
+        output.flush()
+        if output.loss:
+            errors.write(f"{program}: the output could not be written ({output.loss}); all else was done\n")
+        errors.flush()
+        sys.stdout, sys.stderr = before

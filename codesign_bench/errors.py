@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Iterable
+from pathlib import Path
 
 
 class UserError(Exception):
@@ -24,3 +26,12 @@ class ChangedTaskError(UserError):
 def unknown_name(kind: str, name: str, choices: Iterable[str]) -> UserError:
     """Return the error for a name that is not among `choices`; its message lists them."""
     return UserError(f"unknown {kind} '{name}'; choose from: {', '.join(choices)}")
+
+
+def in_one_line(error: BaseException) -> str:
+    """Return an error of code that is not ours as one line: its type, its message, and the file and line it is from."""
+    text = " ".join(traceback.format_exception_only(error)[-1].split())
+    frames = traceback.extract_tb(error.__traceback__)
+    place = (error.filename, error.lineno) if isinstance(error, SyntaxError) else (None, None)
+    file, line = place if place[0] or not frames else (frames[-1].filename, frames[-1].lineno)
+    return f"{text} ({Path(file).name}, line {line})" if file else text

@@ -7,9 +7,10 @@ import inspect
 import os
 from types import ModuleType
 
-from codesign_bench.errors import UnavailableError, UserError
+from codesign_bench.errors import UnavailableError, UserError, in_one_line
 from codesign_bench.method import Method
-from codesign_bench.registry import IMPORTS_VARIABLE, register
+from codesign_bench.registry import register
+from codesign_bench.startup import IMPORTS_VARIABLE, imports_of, search_folder
 from codesign_bench.study import Study
 from codesign_bench.task import Task
 
@@ -20,20 +21,32 @@ def import_modules(modules: list[str]) -> None:
     Tasks and methods are classes, registered under their `name`. A study is the module's attribute `STUDY`. A module
     with `TITLE`, `data` and `draw` is a figure, registered under the last part of the module's name.
 
+    A module that is nowhere else is searched in the working folder. Other modules are not, or a file of results named
+    like a library could be executed.
+
     Raises:
         UserError: a module cannot be found.
-        UnavailableError: a module imports a package that is not installed.
+        UnavailableError: it cannot be imported.
     """
-    known = [name for name in os.environ.get(IMPORTS_VARIABLE, "").split(",") if name]
-    for name in known + [name for name in modules if name not in known]:
-        try:
-            module = importlib.import_module(name)
-        except ModuleNotFoundError as error:
-            if error.name is None or not name.startswith(error.name):
-                raise UnavailableError(f"it needs {error.name}, which is not installed", f"--import {name}") from error
+    known, folder = imports_of(os.environ.get(IMPORTS_VARIABLE, ""))
+    wanted = list(dict.fromkeys([*known, *modules]))
+    finder = search_folder(folder or os.getcwd(), wanted) if modules else None
+    for name in wanted:
+        _register_members(_imported(name))
+    found_in = finder.folder if finder is not None and finder.used else folder
+    os.environ[IMPORTS_VARIABLE] = ",".join(wanted) + (f"={found_in}" if found_in else "")
+
+
+def _imported(name: str) -> ModuleType:
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name is not None and name.startswith(error.name):
             raise UserError(f"--import: no module named '{name}'") from error
-        _register_members(module)
-    os.environ[IMPORTS_VARIABLE] = ",".join(dict.fromkeys(known + modules))
+        where = f"if it is in the working folder, give --import {error.name} first, or set PYTHONPATH"
+        raise UnavailableError(f"it imports '{error.name}', which is not found; {where}", f"--import {name}") from error
+    except (Exception, SystemExit) as error:
+        raise UnavailableError(in_one_line(error), f"--import {name}") from error
 
 
 def _register_members(module: ModuleType) -> None:

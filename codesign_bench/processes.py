@@ -1,10 +1,12 @@
-"""Child processes: one thread per numerical library, and no process that outlives its parent."""
+"""Child processes: one thread per numerical library, a safe module path, and none that outlives its parent."""
 
 from __future__ import annotations
 
 import os
 import threading
 import time
+
+from codesign_bench.startup import SAFE_PATH_VARIABLE
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -20,8 +22,25 @@ EXIT_ORPHANED = 76
 
 
 def thread_environment() -> dict[str, str]:
-    """Return this process's environment with the numerical libraries pinned to one thread."""
-    return {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")}
+    """Return this process's environment with the numerical libraries pinned to one thread, and a safe module path."""
+    return {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1"), SAFE_PATH_VARIABLE: "1"}
+
+
+def keep_modules_of_children_safe() -> None:
+    """Keep the working folder off the module path of every process that this one starts, directly or by a library."""
+    os.environ[SAFE_PATH_VARIABLE] = "1"
+
+
+def existing_folder() -> str | None:
+    """Return the folder in which a process can start: the root if the working folder was deleted, else None (here).
+
+    Numerical libraries end a process that has no working folder.
+    """
+    try:
+        os.getcwd()
+    except OSError:
+        return os.sep
+    return None
 
 
 def end_with(parent_pid: int) -> None:

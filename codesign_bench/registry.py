@@ -8,16 +8,14 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
 from typing import Any
 
-from codesign_bench.errors import UnavailableError, unknown_name
-
-IMPORTS_VARIABLE = "CODESIGN_BENCH_IMPORTS"
-"""Environment variable through which `--import module` reaches the worker processes (module names, comma-separated)."""
+from codesign_bench.errors import UnavailableError, UserError, in_one_line, unknown_name
+from codesign_bench.startup import IMPORTS_VARIABLE as IMPORTS_VARIABLE  # a part of this module, too
 
 KINDS = {"methods": "method", "tasks": "task", "paper_figs": "figure", "studies": "study"}
 """The groups of members, and the singular that messages use for each."""
@@ -101,13 +99,28 @@ def load_attribute(group: str, name: str, attribute: str) -> Any:
     """Return an attribute of the module of the entry `name` of `group`.
 
     Raises:
-        UserError: no entry has this name.
+        UserError: no entry has this name, or the package that adds it cannot be imported.
         TypeError: its module lacks the attribute.
     """
     module = load_module(group, name)
     if not hasattr(module, attribute):
         raise TypeError(f"{module.__name__} is registered as a {KINDS[group]} and must define {attribute}")
     return getattr(module, attribute)
+
+
+def load_all(group: str, attribute: str) -> Iterator[tuple[str, Any]]:
+    """Yield each name of `group` with an attribute of its module; what cannot be loaded is left out.
+
+    Nobody asked for those by name, so a faulty package must not end what does not need it; `list` tells what is wrong.
+    """
+    for name in names(group):
+        try:
+            found = load_attribute(group, name, attribute)
+        except (UserError, TypeError):
+            if name in _files(group):
+                raise
+            continue
+        yield name, found
 
 
 def single_subclass(module: ModuleType, base: type) -> Any:
@@ -140,17 +153,18 @@ def _entry(group: str, name: str) -> Any:
         return load()
     except UnavailableError as error:
         raise UnavailableError(error.reason, f"{KINDS[group]} '{name}'") from error
-    except ImportError as error:
-        if (error.name or "").partition(".")[0] == "codesign_bench" and name in _files(group):
+    except (Exception, SystemExit) as error:
+        lacking = isinstance(error, ImportError) and (error.name or "").partition(".")[0] != "codesign_bench"
+        if name in _files(group) and not lacking:
             raise  # a fault of our own
         raise UnavailableError(_reason(error), f"{KINDS[group]} '{name}'") from error
 
 
-def _reason(error: ImportError) -> str:
+def _reason(error: BaseException) -> str:
     """Return in one line why an import failed."""
     if isinstance(error, ModuleNotFoundError) and error.name:
         return f"it needs {error.name.partition('.')[0]}, which is not installed"
-    return " ".join(str(error).split())
+    return " ".join(str(error).split()) if isinstance(error, ImportError) else in_one_line(error)
 
 
 @lru_cache

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import inf
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from codesign_bench.config.search import Integer
 from codesign_bench.config.settings import Settings
-from codesign_bench.config.validation import check_range
+from codesign_bench.config.values import Within
 from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, fitness_metrics
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
@@ -31,14 +30,10 @@ PLAN = "plan"
 class Config(EvolutionConfig):
     """Hyperparameters of `cma_es`."""
 
-    episodes_per_candidate: int = field(
+    episodes_per_candidate: Annotated[int, Within(1, 10_000)] = field(
         default=4, metadata={"source": "ours; the paper is silent", "search": Integer(1, 32, log=True)}
     )
     """Number of instances over which a candidate's return is averaged, the same for all candidates of a generation."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_range(self, 1, inf, "episodes_per_candidate")
 
 
 TUNED: Tuned = {"laptop": {"sigma0": 0.3, "episodes_per_candidate": 16}, "quick": {}}

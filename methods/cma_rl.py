@@ -41,10 +41,6 @@ class Config(EvolutionConfig, PerceptronConfig):
     not_searched: ClassVar = ("design_log_std", "design_learning_rate", "design_epochs", "design_kl_threshold")
     """Without effect here: CMA-ES moves the design."""
 
-    def __post_init__(self) -> None:
-        EvolutionConfig.__post_init__(self)
-        PerceptronConfig.__post_init__(self)
-
 
 TUNED: Tuned = {"laptop": {"sigma0": 0.4}, "quick": {}}
 """Settings tuned for this baseline (ours)."""

@@ -68,6 +68,8 @@ OF_NO_MODULE = {
     "tests/tasks/test_contract.py": "of every task",
     "tests/tasks/test_frozen_scenes.py": "of every task: that its scene is the one of its version",
     "tests/tasks/test_soundness.py": "of every task: that its physics are sound",
+    "tests/test_command_lines.py": "of the whole program, on input that it must refuse",
+    "tests/test_working_folder.py": "of the whole program, in a folder with modules of the user",
     "tests/test_architecture.py": "of the code as a whole",
     "tests/test_hostile_files.py": "of every command, on results folders with damaged files",
     "tests/test_packaging.py": "of the package as it installs",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import io
+import sys
 
 import pytest
 from rich.console import Console
 
-from codesign_bench.console import duration, number, print_table, printer, tell_left_out
+from codesign_bench.console import duration, number, print_table, printer, steady_streams, tell_left_out
 
 
 def test_durations_have_the_largest_unit_that_fits() -> None:
@@ -33,3 +35,46 @@ def test_text_of_results_controls_no_terminal(terminal: bool) -> None:
 def test_what_is_left_out_is_told_on_standard_error(capsys: pytest.CaptureFixture[str]) -> None:
     tell_left_out(["a.csv: empty", "b.csv: \x1b"])
     assert capsys.readouterr() == ("", "left out: a.csv: empty\nleft out: b.csv: \\x1b\n")
+
+
+class Broken(io.StringIO):
+    """A stream that cannot be written."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__()
+        self.error = error
+
+    def write(self, text: str) -> int:
+        raise self.error
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (BrokenPipeError(errno.EPIPE, "Broken pipe"), ""),
+        (OSError(errno.EBADF, "Bad file descriptor"), ""),
+        (OSError(errno.ENOSPC, "No space left on device"), "prog: the output could not be written (No space left"),
+        (OSError(errno.EIO, "Input/output error"), "prog: the output could not be written (Input/output error)"),
+        (ValueError("I/O operation on closed file"), ""),
+    ],
+)
+def test_output_that_cannot_be_written_ends_nothing_and_is_told_once(
+    error: Exception, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output, errors = Broken(error), io.StringIO()
+    monkeypatch.setattr(sys, "stdout", output)
+    monkeypatch.setattr(sys, "stderr", errors)
+    with steady_streams("prog"):
+        for _ in range(3):
+            printer(Console())("a line")
+    assert errors.getvalue().startswith(told)
+    assert errors.getvalue().count("\n") == bool(told)
+    assert sys.stdout is output
+
+
+def test_a_letter_that_the_stream_does_not_have_is_written_as_an_escape(monkeypatch: pytest.MonkeyPatch) -> None:
+    raw = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(raw, encoding="ascii"))
+    with steady_streams("prog"):
+        print("gr\u00fcn \udcff")
+    assert raw.getvalue() == b"gr\\xfcn \\udcff\n"

@@ -64,6 +64,6 @@ def test_a_module_that_is_not_there_is_told_from_one_that_lacks_another(folder: 
     with pytest.raises(UserError, match="--import: no module named 'nowhere_to_find'"):
         import_modules(["nowhere_to_find"])
     (folder / "lacking.py").write_text("import a_missing_library\n")
-    with pytest.raises(UnavailableError, match="--import lacking is not available: it needs a_missing_library, which"):
+    with pytest.raises(UnavailableError, match="--import lacking is not available: it imports 'a_missing_library'"):
         import_modules(["lacking"])
     assert os.environ[IMPORTS_VARIABLE] == "toy"

@@ -15,7 +15,6 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from math import inf
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -53,7 +52,7 @@ def ours(method_name: str, precision: str = "fp32") -> Callable[[Workload], Spee
         method_class: Any = load_method(method_name)
         same = {"batch_size": work.batch_size, "minibatch_size": work.minibatch_size, "epochs": work.epochs}
         config = resolve(method_class, work.task, work.profile).method
-        config = replace(config, **same, precision=precision, kl_threshold=inf)
+        config = replace(config, **same, precision=precision, kl_threshold=NEVER)
         learner = method_class(Problem(load_task(work.task)), config, Streams(0)).learner
         learner.use_cores(work.cores)
         slots = max(1, round(work.batch_size / (learner.problem.task.horizon + 1)))
@@ -84,7 +83,7 @@ def operations_per_sample(method_name: str, work: Workload) -> float:
     counts, steps = [], 0
     for epochs in (1, 2):
         same = {"batch_size": work.minibatch_size, "minibatch_size": work.minibatch_size, "epochs": epochs}
-        config = replace(resolve(method_class, work.task, work.profile).method, **same, kl_threshold=inf)
+        config = replace(resolve(method_class, work.task, work.profile).method, **same, kl_threshold=NEVER)
         learner = method_class(Problem(load_task(work.task)), config, Streams(0)).learner
         batch = learner.collect(work.minibatch_size, max(1, work.minibatch_size // (load_task(work.task).horizon + 1)))
         steps = batch.env_steps
@@ -94,6 +93,8 @@ def operations_per_sample(method_name: str, work: Workload) -> float:
     return (counts[1] - counts[0]) / steps
 
 
+NEVER = 1e6
+"""A KL divergence at which no update stops."""
 CEILING_REPEATS = 50
 """Number of products; the fastest is the ceiling, since other users of the machine may slow some down."""
 

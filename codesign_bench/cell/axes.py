@@ -5,16 +5,17 @@ A study may define more axes; see `Study.axes`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from codesign_bench.cell.variant import Value, Variant
 from codesign_bench.config.run_settings import VALIDATION, RunSettings
-from codesign_bench.config.values import parse_value
+from codesign_bench.config.values import Share, Within, check_value, parse_value, printable
 from codesign_bench.errors import UserError, unknown_name
 from codesign_bench.method import Problem
-from codesign_bench.registry import load_attribute, usable_modules
+from codesign_bench.registry import load_all
 from codesign_bench.task import Task
 from codesign_bench.task.episodes import Tradeoff
 
@@ -24,8 +25,8 @@ class Axis:
 
     name: ClassVar[str]
     """Column of frames, part of the variant's name, option of `run`."""
-    kind: ClassVar[type] = float
-    """Type of its values: float, int or str."""
+    kind: ClassVar[Any] = float
+    """Kind of its values: float, int or str, with limits if any, as those of settings; see `config.values`."""
     metavar: ClassVar[str] = "X"
     help: ClassVar[str] = ""
     """Help of the option, in one line."""
@@ -33,11 +34,15 @@ class Axis:
     """Axes with the same word here are never varied together; a grid contains each separately."""
 
     def check(self, value: Value, task: Task) -> None:
-        """Check that a value is valid, and possible on `task`.
+        """Check that a value is of the axis's kind, and possible on `task`.
 
         Raises:
             UserError: it is not; names the value.
         """
+        try:
+            check_value(self.kind, value)
+        except ValueError as error:
+            raise UserError(f"--variant {self.name}={value}: expected {error}") from error
 
     def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
         """Return the learning problem of the cell's method."""
@@ -60,13 +65,13 @@ class Cutout(Axis):
     """Holds out the inner part of the training region (paper, section 5.2)."""
 
     name = "cutout"
+    kind = Annotated[float, Within(0.0, 1.0, open_low=True, open_high=True)]
     metavar = "F"
     help = "hold out the inner fraction F of the goal region from training"
 
     def check(self, value: Value, task: Task) -> None:
         """Check that the fraction is in (0, 1) and that the task has positions."""
-        if not 0.0 < float(value) < 1.0:
-            raise UserError(f"--cutout must be between 0 and 1 (both excluded), not {value:g}")
+        super().check(value, task)
         task.in_cutout(task.evaluation_instances()[:1], float(value))
 
     def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
@@ -78,19 +83,17 @@ class Alpha(Axis):
     """Adds the trade-off reward (paper, equation 1)."""
 
     name = "alpha"
+    kind = Share
     metavar = "A"
     help = "add the trade-off reward with coefficient A"
-
-    def check(self, value: Value, task: Task) -> None:
-        """Check that the coefficient is in [0, 1]."""
-        if not 0.0 <= float(value) <= 1.0:
-            raise UserError(f"--alpha must be between 0 and 1, not {value:g}")
 
     def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
         """Add the trade-off reward."""
         return replace(problem, tradeoff=Tradeoff(float(value), run.tradeoff_scale))
 
 
+FOLDER_NAME = re.compile(r"[A-Za-z0-9+][A-Za-z0-9._+-]{0,99}")
+"""Texts that may be values of an axis: they become a part of the name of a cell's folder."""
 FINE_TUNING_INSTANCES = 8
 """Instances at a fine-tuning place (ours; the paper and version 0.1.0 have one)."""
 
@@ -98,7 +101,7 @@ FINE_TUNING_INSTANCES = 8
 class _OnePlace(Axis):
     """Trains only at one of the task's fine-tuning places."""
 
-    kind = int
+    kind = Annotated[int, Within(1, 10_000)]
     metavar = "N"
     exclusive = "instance"
 
@@ -143,13 +146,8 @@ class Scratch(_OnePlace):
 class _OfTuning(Axis):
     """Numbers the cells of a search for settings; these are evaluated on validation instances, at start and end."""
 
-    kind = int
+    kind = Annotated[int, Within(0, 1_000_000)]
     metavar = "N"
-
-    def check(self, value: Value, task: Task) -> None:
-        """Refuse negative numbers."""
-        if int(value) < 0:
-            raise UserError(f"--variant {self.name}={value}: must not be negative")
 
     def overrides(self, value: Value) -> tuple[str, ...]:
         """Keep the cell from being reported, and evaluate it no more often than the search needs."""
@@ -192,7 +190,7 @@ def axis_named(name: str) -> Axis:
 
 def axes() -> dict[str, Axis]:
     """Return all axes by name: the built-in ones, then those of every study."""
-    added = (axis for study in usable_modules("studies") for axis in load_attribute("studies", study, "STUDY").axes)
+    added = (axis for _, study in load_all("studies", "STUDY") for axis in study.axes)
     return {**BUILT_IN, **OF_TUNING, **{axis.name: axis for axis in added}}
 
 
@@ -205,6 +203,8 @@ def parse_axis_value(name: str, text: str) -> Value:
     axis = axis_named(name)
     try:
         value: Value = parse_value(axis.kind, text)
+        if isinstance(value, str) and not FOLDER_NAME.fullmatch(value):
+            raise ValueError("letters, digits and any of . _ + - as a part of a folder's name")
     except ValueError as error:
-        raise UserError(f"--variant {name}={text}: expected {error}") from error
+        raise UserError(f"--variant {name}={printable(text)}: expected {error}") from error
     return value

@@ -1,13 +1,17 @@
-"""Arguments that several commands share: folders, number formats and groups of names."""
+"""Arguments that several commands share: folders, kinds of values and groups of names."""
 
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from codesign_bench.config.profiles import DEFAULT_PROFILE
-from codesign_bench.config.values import parse_int
+from codesign_bench.config.resolve import split_override
+from codesign_bench.config.run_settings import Steps, Threads
+from codesign_bench.config.values import parse_value, printable, shown
 from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError, unknown_name
 from codesign_bench.registry import KINDS, names
@@ -18,13 +22,17 @@ DEFAULT_FIGURES = Path("results/figures")
 DEFAULT_CLAIMS = Path("results/claims")
 DEFAULT_REPORT = Path("results/report.html")
 ALL, BEYOND = "all", "beyond"
+LONGEST_PATH, LONGEST_NAME = 3_000, 255
+"""Bytes of a path and of a name in it; systems allow 4,096 and 255, and files below the path need some."""
+Jobs = Threads
+"""How many cells may run at a time: as many as there may be cores."""
 
 
 def add_results(parser: argparse.ArgumentParser) -> None:
     """Add `--results`, the folder that a command reads."""
     parser.add_argument(
         "--results",
-        type=Path,
+        type=path,
         default=DEFAULT_RESULTS,
         metavar="DIR",
         help=f"results folder; default: {DEFAULT_RESULTS}",
@@ -34,7 +42,7 @@ def add_results(parser: argparse.ArgumentParser) -> None:
 def add_out(parser: argparse.ArgumentParser, default: Path, metavar: str = "DIR") -> None:
     """Add `--out`, the file or folder that a command writes."""
     kind = "file" if metavar == "FILE" else "folder"
-    parser.add_argument("--out", type=Path, default=default, metavar=metavar, help=f"output {kind}; default: {default}")
+    parser.add_argument("--out", type=path, default=default, metavar=metavar, help=f"output {kind}; default: {default}")
 
 
 def add_profile(parser: argparse.ArgumentParser) -> None:
@@ -56,7 +64,9 @@ def add_study(parser: argparse.ArgumentParser) -> None:
 
 def add_jobs(parser: argparse.ArgumentParser) -> None:
     """Add `--jobs`, the number of cells that run at a time."""
-    parser.add_argument("--jobs", type=integer, metavar="N", help="cells that run at a time; default: one per core")
+    parser.add_argument(
+        "--jobs", type=OfKind(Jobs), metavar="N", help="cells that run at a time; default: one per core"
+    )
 
 
 def add_sweep(parser: argparse.ArgumentParser) -> None:
@@ -83,7 +93,7 @@ def add_config(parser: argparse.ArgumentParser) -> None:
     """Add what determines a cell's configuration: profile, budget and individual settings."""
     add_profile(parser)
     parser.add_argument(
-        "--steps", type=integer, metavar="N", help="budget in environment steps (default: the profile's)"
+        "--steps", type=OfKind(Steps), metavar="N", help="budget in environment steps (default: the profile's)"
     )
     parser.add_argument(
         "--set",
@@ -96,31 +106,68 @@ def add_config(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def integer(text: str) -> int:
-    """Return an integer written as 150000, 150_000 or 1.5e5."""
-    try:
-        return parse_int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"'{text}' is not an integer") from None
+class OfKind:
+    """Parses an option's value as a kind of values: see `config.values`."""
+
+    def __init__(self, kind: Any) -> None:
+        self.kind = kind
+
+    def __call__(self, text: str) -> Any:
+        """Return the value of `text`.
+
+        Raises:
+            ArgumentTypeError: it is not of this kind.
+        """
+        try:
+            return parse_value(self.kind, text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(f"expected {error}, not {shown(text)}") from None
 
 
-def seed(text: str) -> int:
-    """Return a seed."""
-    if (value := integer(text)) < 0:
-        raise argparse.ArgumentTypeError(f"a seed must be at least 0, not {value}")
-    return value
-
-
-def check_at_least_one(options: argparse.Namespace, *options_names: str) -> None:
-    """Check that the options that are given are at least 1.
+def path(text: str) -> Path:
+    """Return a path that the system can hold, with room for the names of what is written below it.
 
     Raises:
-        UserError: one is not; names the first.
+        ArgumentTypeError: it is empty, or contains what no path can.
     """
-    for name in options_names:
-        value = getattr(options, name)
-        if value is not None and value < 1:
-            raise UserError(f"--{name.replace('_', '-')} must be at least 1, not {value}")
+    if not text.strip():
+        raise argparse.ArgumentTypeError("expected a path, not an empty text")
+    if "\0" in text:
+        raise argparse.ArgumentTypeError(f"expected a path, which cannot contain a zero byte, not {shown(text)}")
+    if len(os.fsencode(text)) > LONGEST_PATH or any(len(os.fsencode(part)) > LONGEST_NAME for part in Path(text).parts):
+        raise argparse.ArgumentTypeError(f"expected a shorter path than {shown(text)}")
+    return Path(text)
+
+
+def module_name(text: str) -> str:
+    """Return the dotted name of a module.
+
+    Raises:
+        ArgumentTypeError: no module can have this name.
+    """
+    if len(text) > LONGEST_NAME or not all(part.isidentifier() for part in text.split(".")):
+        raise argparse.ArgumentTypeError(
+            f"expected the dotted name of a module, such as my_package.my_task, not {shown(text)}"
+        )
+    return text
+
+
+def check_once(overrides: Sequence[str], **options: object) -> None:
+    """Check that no setting is given twice, by `--set` or by one of `options`, which name the settings that they set.
+
+    Raises:
+        UserError: one is; names it.
+    """
+    given = [name for name, value in options.items() if value is not None]
+    seen: set[str] = set()
+    for text in overrides:
+        prefix, key, _ = split_override(text)
+        name = key if prefix is None else f"{prefix}.{key}"
+        if name in seen:
+            raise UserError(f"--set {printable(text)}: {shown(name)} is given twice")
+        if key in given:
+            raise UserError(f"--set {printable(text)}: --{key} gives it, too; leave out one of them")
+        seen.add(name)
 
 
 def chosen_names(group: str, given: Sequence[str], meanings: Mapping[str, Sequence[str]]) -> list[str]:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from typing import Annotated
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import ALL, check_at_least_one, chosen_tasks, integer
+from codesign_bench.cli.arguments import ALL, Jobs, OfKind, chosen_tasks, path
 from codesign_bench.config.profiles import profile_named
+from codesign_bench.config.values import Within
 from codesign_bench.console import printer
 from codesign_bench.errors import unknown_name
 
+Seconds = Annotated[float, Within(0.0, 86_400.0, open_low=True)]
+BatchSteps = Annotated[int, Within(1, 10_000_000)]
+Passes = Annotated[int, Within(1, 10_000)]
 HELP = "measure the speed of tasks and learners on this machine"
 
 
@@ -22,22 +26,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "tasks", help="environment steps, compared with the bare physics engine", allow_abbrev=False
     )
     tasks.add_argument("--task", nargs="+", default=[ALL], metavar="T", help="names, or all (default)")
-    tasks.add_argument("--seconds", type=float, default=5.0, metavar="S", help="seconds per task; default: 5")
+    tasks.add_argument("--seconds", type=OfKind(Seconds), default=5.0, metavar="S", help="seconds per task; default: 5")
     learner = kinds.add_parser("learner", help="learners, compared with those of other libraries", allow_abbrev=False)
     learner.add_argument("--task", metavar="T", help="default: the first task that `list` shows")
     learner.add_argument("--profile", metavar="P", help="profile of the networks; default: the paper's")
-    learner.add_argument("--cores", type=integer, default=1, metavar="N", help="cores per cell; default: 1")
-    learner.add_argument("--cells", type=integer, default=1, metavar="N", help="cells that run at a time; default: 1")
+    learner.add_argument("--cores", type=OfKind(Jobs), default=1, metavar="N", help="cores per cell; default: 1")
     learner.add_argument(
-        "--batch-size", type=integer, default=50_000, metavar="N", help="steps per batch; default: 50000"
+        "--cells", type=OfKind(Jobs), default=1, metavar="N", help="cells that run at a time; default: 1"
     )
     learner.add_argument(
-        "--minibatch-size", type=integer, default=2_000, metavar="N", help="steps per minibatch; default: 2000"
+        "--batch-size", type=OfKind(BatchSteps), default=50_000, metavar="N", help="steps per batch; default: 50000"
     )
-    learner.add_argument("--epochs", type=integer, default=10, metavar="N", help="epochs per batch; default: 10")
-    learner.add_argument("--repeats", type=integer, default=3, metavar="N", help="timed batches; default: 3")
+    learner.add_argument(
+        "--minibatch-size",
+        type=OfKind(BatchSteps),
+        default=2_000,
+        metavar="N",
+        help="steps per minibatch; default: 2000",
+    )
+    learner.add_argument("--epochs", type=OfKind(Passes), default=10, metavar="N", help="epochs per batch; default: 10")
+    learner.add_argument("--repeats", type=OfKind(Passes), default=3, metavar="N", help="timed batches; default: 3")
     learner.add_argument("--only", nargs="+", metavar="NAME", help="names of learners; default: all")
-    learner.add_argument("--out", type=Path, metavar="FILE", help="also write the numbers to this JSON file")
+    learner.add_argument("--out", type=path, metavar="FILE", help="also write the numbers to this JSON file")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -50,7 +60,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.benchmarks.learner import bench_learner, contestants
     from codesign_bench.benchmarks.workload import Workload
 
-    check_at_least_one(options, "cores", "cells", "batch_size", "minibatch_size", "epochs", "repeats")
     wanted = options.only or list(contestants())
     for name in wanted:
         if name not in contestants():

@@ -3,46 +3,57 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from typing import Annotated
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import DEFAULT_RESULTS, add_out, integer, seed
+from codesign_bench.cell.grid import Seed
+from codesign_bench.cli.arguments import DEFAULT_RESULTS, OfKind, add_out, path
+from codesign_bench.config.values import Within
 from codesign_bench.console import printer
 from codesign_bench.errors import UserError
 
 HELP = "run a policy and its tools on a simulated robot arm"
+Tool = Annotated[int, Within(0, 10_000)]
+Trials = Annotated[int, Within(1, 10_000)]
+BelowOne = Annotated[float, Within(0.0, 1.0, open_high=True)]
+Latency = Annotated[int, Within(0, 10_000)]
 CONDITIONS = ("arm", "observation_noise", "latency", "friction", "mass")
 """Options that set a condition of the trials."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the policy, the trials and their conditions."""
-    parser.add_argument("--policy", type=Path, required=True, metavar="CELL", help="folder of a finished cell")
+    parser.add_argument("--policy", type=path, required=True, metavar="CELL", help="folder of a finished cell")
     parser.add_argument("--task", metavar="T", help="default: the task of --policy")
     parser.add_argument(
         "--protocol", action="store_true", help="the paper's Table 1: five trials of each tool and the grid of starts"
     )
-    parser.add_argument("--tool", nargs="+", type=integer, default=[], metavar="N", help="tools; default: all of them")
-    parser.add_argument("--trials", type=integer, metavar="N", help="trials of each tool; default: 1")
+    parser.add_argument(
+        "--tool", nargs="+", type=OfKind(Tool), default=[], metavar="N", help="tools; default: all of them"
+    )
+    parser.add_argument("--trials", type=OfKind(Trials), metavar="N", help="trials of each tool; default: 1")
     parser.add_argument("--arm", help="panda (default), or ideal: the gantry used in training")
     parser.add_argument(
         "--observation-noise",
-        type=float,
+        type=OfKind(BelowOne),
         metavar="M",
         help="standard deviation of the noise on every observed length, m (default 0; the protocol uses 0.002)",
     )
     parser.add_argument(
-        "--latency", type=integer, metavar="STEPS", help="delay of the observed state (default 0; the protocol uses 1)"
+        "--latency",
+        type=OfKind(Latency),
+        metavar="STEPS",
+        help="delay of the observed state (default 0; the protocol uses 1)",
     )
     for name in ("friction", "mass"):
         parser.add_argument(
             f"--{name}",
-            type=float,
+            type=OfKind(BelowOne),
             metavar="SHARE",
             help=f"randomise {name} by up to +-SHARE (default 0; the protocol uses 0.2)",
         )
-    parser.add_argument("--seed", type=seed, default=0, help="seed of noise and randomisation; default: 0")
+    parser.add_argument("--seed", type=OfKind(Seed), default=0, help="seed of noise and randomisation; default: 0")
     parser.add_argument("--no-gifs", action="store_true", help="do not write animations of the trials")
     add_out(parser, DEFAULT_RESULTS)
 

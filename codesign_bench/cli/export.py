@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 import re
-from pathlib import Path
+from typing import Annotated
 
 from rich.console import Console
 
+from codesign_bench.cli.arguments import OfKind, path
+from codesign_bench.config.values import Within
 from codesign_bench.console import printer
 
+Scale = Annotated[float, Within(0.0, 1_000.0, open_low=True)]
 HELP = "write a policy's tools as printable meshes"
 
 
@@ -17,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the policy, the instances whose tools are written, and the folder."""
     # argparse would read a value such as `-0.2,0.7` as an option: its own pattern matches single numbers only.
     parser._negative_number_matcher = re.compile(r"^-\.?\d")
-    parser.add_argument("--policy", type=Path, required=True, metavar="CELL", help="folder of a finished cell")
+    parser.add_argument("--policy", type=path, required=True, metavar="CELL", help="folder of a finished cell")
     parser.add_argument("--task", metavar="T", help="default: the task of --policy")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--start", metavar="X,Y", help="the tool for an object that starts at this position, m")
@@ -25,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     which.add_argument(
         "--instances", metavar="N,...", help="tools for these evaluation instances; default: all of them"
     )
-    parser.add_argument("--scale", type=float, default=1.0, metavar="S", help="scale of the print; default: 1")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="output folder")
+    parser.add_argument("--scale", type=OfKind(Scale), default=1.0, metavar="S", help="scale of the print; default: 1")
+    parser.add_argument("--out", type=path, required=True, metavar="DIR", help="output folder")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

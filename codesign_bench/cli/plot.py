@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import DEFAULT_FIGURES, add_out, add_results, add_study
+from codesign_bench.cli.arguments import DEFAULT_FIGURES, add_out, add_results, add_study, path
 from codesign_bench.console import printer, tell_left_out
 from codesign_bench.study import load_study
 
@@ -26,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_results(parser)
     add_out(parser, DEFAULT_FIGURES)
     parser.add_argument(
-        "--compare", type=Path, metavar="DIR", help="overlay the learning curves of these results, dashed"
+        "--compare", type=path, metavar="DIR", help="overlay the learning curves of these results, dashed"
     )
 
 

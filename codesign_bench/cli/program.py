@@ -3,20 +3,33 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import NoReturn
+from pathlib import Path
+from typing import Any, NoReturn
 
 from rich.console import Console
 
 from codesign_bench import __version__
+from codesign_bench.cli.arguments import module_name
+from codesign_bench.console import steady_streams
 from codesign_bench.errors import UserError
 from codesign_bench.plugins import import_modules
+from codesign_bench.processes import existing_folder, keep_modules_of_children_safe
+from codesign_bench.startup import (
+    EXIT_INTERRUPTED,
+    PROGRAM,
+    end_quietly_on_interrupt,
+    is_program,
+    raise_on_interrupt,
+)
 from codesign_bench.visible_text import visible
 
-PROGRAM = "codesign-bench"
-EXIT_BAD_INPUT, EXIT_INTERRUPTED = 2, 130
+EXIT_BAD_INPUT = 2
+LONGEST_LINE = 1_000
+"""Characters; a longer line of a message loses its middle."""
 COMMANDS = (
     "list",
     "show",
@@ -39,31 +52,66 @@ COMMANDS = (
 class _Parser(argparse.ArgumentParser):
     """An argument parser that reports bad input in two lines."""
 
+    def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
+        # argparse drops `--` even where it is all that an option is given, as in `--jobs=--`.
+        if action.option_strings and arg_strings and set(arg_strings) == {"--"}:
+            raise argparse.ArgumentError(action, "expected a value, not '--'")
+        return super()._get_values(action, arg_strings)
+
     def error(self, message: str) -> NoReturn:
-        print(f"{self.prog}: {visible(' '.join(message.split()))}\nsee: {self.prog} --help", file=sys.stderr)
+        told = in_few_lines(" ".join(message.split()) or "bad input")
+        print(f"{self.prog}: {told}\nsee: {self.prog} --help", file=sys.stderr)
         raise SystemExit(EXIT_BAD_INPUT)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code."""
+    keep_modules_of_children_safe()
+    with steady_streams(PROGRAM):
+        try:
+            return _run(arguments)
+        except KeyboardInterrupt:
+            print("\ninterrupted; the same command resumes", file=sys.stderr)
+            return EXIT_INTERRUPTED
+        finally:
+            if is_program():
+                end_quietly_on_interrupt()
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
         options = build_parser().parse_args(arguments)
     except SystemExit as stop:  # --help, --version and bad input
         return stop.code if isinstance(stop.code, int) else EXIT_BAD_INPUT
-    console = Console()
     try:
-        _extend_path(options.imports)
+        _leave_deleted_folder(options)
         import_modules(options.imports)
-        return int(options.command(options, console))
+        raise_on_interrupt()  # from here on there may be something to save
+        return int(options.command(options, Console()))
     except UserError as error:
-        print(visible(f"{PROGRAM}: {error}"), file=sys.stderr)
+        print(f"{PROGRAM}: {in_few_lines(str(error))}", file=sys.stderr)
         return EXIT_BAD_INPUT
-    except KeyboardInterrupt:
-        print("\ninterrupted; the same command resumes", file=sys.stderr)
-        return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader of the output, e.g. `head`, has closed the pipe
-        sys.stderr.close()
-        return 0
+
+
+def _leave_deleted_folder(options: argparse.Namespace) -> None:
+    """Go to the root if the working folder was deleted, for libraries do not work without one.
+
+    Raises:
+        UserError: it was, and a path is given relative to it.
+    """
+    if (root := existing_folder()) is not None:
+        for name, value in vars(options).items():
+            if isinstance(value, Path) and not value.is_absolute():
+                raise UserError(f"the working folder was deleted: give --{name} as an absolute path, not {value}")
+        os.chdir(root)
+
+
+def in_few_lines(text: str) -> str:
+    """Return a message of at most two lines without control characters, whatever a user's words in it contain."""
+    first, *others = visible(text.replace("\t", " ")).splitlines()
+    lines = [first, " ".join(others)] if others else [first]
+    half = LONGEST_LINE // 2
+    return "\n".join(line if len(line) <= LONGEST_LINE else f"{line[:half]} ... {line[-half:]}" for line in lines)
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -80,6 +128,7 @@ def build_parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--import",
             dest="imports",
+            type=module_name,
             metavar="MODULE",
             action="append",
             default=[],
@@ -87,9 +136,3 @@ def build_parser() -> argparse.ArgumentParser:
         )
         module.add_arguments(command)
     return parser
-
-
-def _extend_path(imports: Sequence[str]) -> None:
-    """Make `--import` find modules in the working folder, as `python -m` does."""
-    if imports and "" not in sys.path:
-        sys.path.insert(0, "")

@@ -7,7 +7,7 @@ import os
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import ALL, add_results, check_at_least_one, chosen_tasks, integer
+from codesign_bench.cli.arguments import ALL, Jobs, OfKind, add_results, chosen_tasks
 from codesign_bench.console import printer, tell_left_out
 
 HELP = "measure reference points: idling, random tools, the script, the best single tool, the best known"
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--again", action="store_true", help="also measure what is there, e.g. after a change to a task's scene"
     )
     parser.add_argument(
-        "--jobs", type=integer, metavar="N", help="processes that play side by side; default: one per core"
+        "--jobs", type=OfKind(Jobs), metavar="N", help="processes that play side by side; default: one per core"
     )
 
 
@@ -32,7 +32,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.storage.survey import lines, survey
     from codesign_bench.text_tables import markdown
 
-    check_at_least_one(options, "jobs")
     log = printer(console)
     tasks = chosen_tasks(options.task, log)
     tell_left_out(lines(options.results, survey(options.results)))

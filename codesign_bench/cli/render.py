@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from typing import Annotated
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import check_at_least_one, integer, seed
+from codesign_bench.cell.grid import Seed
+from codesign_bench.cli.arguments import OfKind, path
+from codesign_bench.config.values import Within
 from codesign_bench.console import printer
 from codesign_bench.errors import UserError
 
+Episodes = Annotated[int, Within(1, 10_000)]
 HELP = "draw episodes of a policy, as an animation or a picture"
 
 
@@ -18,16 +21,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the behaviour, the task and the output file."""
     parser.add_argument("--task", metavar="T", help="default: the task of --policy")
     parser.add_argument(
-        "--policy", type=Path, metavar="CELL", help="folder of a finished cell, whose final policy is used"
+        "--policy", type=path, metavar="CELL", help="folder of a finished cell, whose final policy is used"
     )
     parser.add_argument(
         "--behaviour", choices=("random", "script"), help="used without --policy; default: the task's script"
     )
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="output file, .gif (animation) or .png (picture)"
+        "--out", type=path, required=True, metavar="FILE", help="output file, .gif (animation) or .png (picture)"
     )
-    parser.add_argument("--episodes", type=integer, default=4, metavar="N", help="number of episodes; default: 4")
-    parser.add_argument("--seed", type=seed, default=0, help="seed of random behaviour; default: 0")
+    parser.add_argument(
+        "--episodes", type=OfKind(Episodes), default=4, metavar="N", help="number of episodes; default: 4"
+    )
+    parser.add_argument("--seed", type=OfKind(Seed), default=0, help="seed of random behaviour; default: 0")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -42,7 +47,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise UserError("render: give --policy or --task")
     if options.policy is not None and options.behaviour is not None:
         raise UserError("render: give either --policy or --behaviour, not both")
-    check_at_least_one(options, "episodes")
     behaviour: Behaviour
     if options.policy is not None:
         behaviour, task = policy_and_task(options.policy, options.task)

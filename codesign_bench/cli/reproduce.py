@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import argparse
 import signal
-from pathlib import Path
 
 from rich.console import Console
 
+from codesign_bench.cell.grid import Count
 from codesign_bench.cli.arguments import (
     DEFAULT_FIGURES,
     DEFAULT_RESULTS,
+    OfKind,
     add_jobs,
     add_out,
     add_profile,
     add_same_code,
     add_study,
-    check_at_least_one,
-    integer,
+    path,
 )
 from codesign_bench.config.profiles import profile_named
 from codesign_bench.study import load_study
@@ -31,14 +31,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_study(parser)
     add_profile(parser)
     parser.add_argument(
-        "--seeds", type=integer, metavar="N", help="number of seeds per configuration (default: the study's)"
+        "--seeds", type=OfKind(Count), metavar="N", help="number of seeds per configuration (default: the study's)"
     )
     add_jobs(parser)
     add_out(parser, DEFAULT_RESULTS)
     add_same_code(parser)
     parser.add_argument(
         "--figures",
-        type=Path,
+        type=path,
         default=DEFAULT_FIGURES,
         metavar="DIR",
         help=f"output folder of figures; default: {DEFAULT_FIGURES}",
@@ -50,7 +50,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.reproduce import reproduce
 
     profile_named(options.profile)  # refuses an unknown profile before anything runs
-    check_at_least_one(options, "seeds", "jobs")
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does
     return reproduce(
         load_study(options.study),

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 import signal
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from rich.console import Console
 
@@ -15,17 +15,19 @@ from codesign_bench.cell.axes import BUILT_IN, parse_axis_value
 from codesign_bench.cell.variant import Value
 from codesign_bench.cli.arguments import (
     DEFAULT_RESULTS,
+    OfKind,
     add_config,
     add_jobs,
     add_out,
     add_same_code,
     add_sweep,
-    check_at_least_one,
+    check_once,
     chosen_methods,
     chosen_tasks,
-    integer,
+    path,
 )
-from codesign_bench.config.run_settings import DEVICES, PRECISIONS
+from codesign_bench.config.run_settings import Device, PrecisionChoice
+from codesign_bench.config.values import printable
 from codesign_bench.console import printer
 from codesign_bench.errors import UserError
 
@@ -33,8 +35,6 @@ if TYPE_CHECKING:
     from codesign_bench.cell.cell import Cell
 
 HELP = "train and evaluate: method x task x variant x seed"
-VALUE_TYPES: Mapping[type, Callable[[str], Value]] = {float: float, int: integer, str: str}
-"""How values of an axis are parsed, by their type."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,11 +46,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seeds", default="1", help="a count (6 is 0-5), a list (0,3,5) or a range (2-4); default: 1")
     add_config(parser)
     parser.add_argument(
-        "--tuned", type=Path, metavar="FILE", help="settings that `tune` found for each task and method (tuned.json)"
+        "--tuned", type=path, metavar="FILE", help="settings that `tune` found for each task and method (tuned.json)"
     )
     for axis in BUILT_IN.values():
         parser.add_argument(
-            f"--{axis.name}", nargs="+", type=VALUE_TYPES[axis.kind], default=[], metavar=axis.metavar, help=axis.help
+            f"--{axis.name}", nargs="+", type=OfKind(axis.kind), default=[], metavar=axis.metavar, help=axis.help
         )
     parser.add_argument(
         "--variant",
@@ -61,9 +61,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="vary an axis, e.g. one that a study or a package defines",
     )
     add_jobs(parser)
-    parser.add_argument("--device", choices=DEVICES, help="device for network updates; default: cpu")
+    parser.add_argument("--device", choices=get_args(Device), help="device for network updates; default: cpu")
     parser.add_argument(
-        "--precision", choices=PRECISIONS, help="auto: bfloat16 updates if the processor supports them; default: fp32"
+        "--precision",
+        choices=get_args(PrecisionChoice),
+        help="auto: bfloat16 updates if the processor supports them; default: fp32",
     )
     add_out(parser, DEFAULT_RESULTS)
     add_sweep(parser)
@@ -79,7 +81,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.cell.grid import grid, parse_seeds, variants_of
     from codesign_bench.sweep.runner import run_sweep
 
-    check_at_least_one(options, "steps", "jobs")
+    check_once(options.overrides, steps=options.steps, device=options.device, precision=options.precision)
     log = printer(console)
     cells = grid(
         tasks=chosen_tasks(options.task, log),
@@ -131,8 +133,8 @@ def axis_values(options: argparse.Namespace) -> dict[str, list[Value]]:
     values: dict[str, list[Value]] = {name: list(getattr(options, name)) for name in BUILT_IN}
     for text in options.variant:
         axis, equals, listed = text.partition("=")
-        if not equals or not listed:
-            raise UserError(f"--variant {text}: write it as AXIS=VALUE or AXIS=VALUE,VALUE")
+        if not axis or not equals or not listed:
+            raise UserError(f"--variant {printable(text)}: write it as AXIS=VALUE or AXIS=VALUE,VALUE")
         values.setdefault(axis, []).extend(parse_axis_value(axis, value) for value in listed.split(","))
     return values
 

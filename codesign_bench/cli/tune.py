@@ -8,15 +8,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import (
-    add_jobs,
-    add_profile,
-    add_same_code,
-    add_study,
-    add_sweep,
-    check_at_least_one,
-    integer,
-)
+from codesign_bench.cli.arguments import OfKind, add_jobs, add_profile, add_same_code, add_study, add_sweep, path
+from codesign_bench.config.run_settings import Steps
 from codesign_bench.console import printer
 from codesign_bench.study import load_study
 
@@ -30,11 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_study(parser)
     add_profile(parser)
     parser.add_argument(
-        "--steps", type=integer, metavar="N", help="budget of a cell in the last rung (default: the profile's)"
+        "--steps", type=OfKind(Steps), metavar="N", help="budget of a cell in the last rung (default: the profile's)"
     )
     parser.add_argument("--plan", action="store_true", help="print the rungs and the steps that they take, and stop")
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", help=f"output folder; default: {DEFAULT_FOLDER}/<name of the study>"
+        "--out", type=path, metavar="DIR", help=f"output folder; default: {DEFAULT_FOLDER}/<name of the study>"
     )
     add_jobs(parser)
     add_sweep(parser)
@@ -45,7 +38,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Search, or print the plan; return 1 if a cell failed."""
     from codesign_bench.tuning.tune import print_plan, tune, tuning_of, usable_part
 
-    check_at_least_one(options, "steps", "jobs")
     study = load_study(options.study)
     if options.plan:
         print_plan(console, usable_part(tuning_of(study), printer(console)), options.profile, options.steps)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from codesign_bench.config.settings import Settings, sourced
 from codesign_bench.errors import unknown_name
-from codesign_bench.registry import load_attribute, usable_modules
+from codesign_bench.registry import load_all
 
 DEFAULT_PROFILE = "laptop"
 
@@ -58,7 +58,7 @@ BUILT_IN: Mapping[str, Profile] = {
 
 def profiles() -> dict[str, Profile]:
     """Return all profiles by name: the built-in ones, then those of every study."""
-    added = (profile for study in usable_modules("studies") for profile in _of_study(study))
+    added = (profile for _, study in load_all("studies", "STUDY") for profile in study.profiles)
     return {**BUILT_IN, **{profile.name: profile for profile in added}}
 
 
@@ -74,8 +74,3 @@ def profile_named(name: str) -> Profile:
     if name not in known:
         raise unknown_name("profile", name, known)
     return known[name]
-
-
-def _of_study(name: str) -> tuple[Profile, ...]:
-    profiles: tuple[Profile, ...] = load_attribute("studies", name, "STUDY").profiles
-    return profiles

@@ -10,7 +10,8 @@ from typing import Any
 from codesign_bench.config.profiles import profile_named
 from codesign_bench.config.run_settings import RunSettings
 from codesign_bench.config.settings import METHOD, RUN, Settings, Sourced, StoredConfig, plain, sourced
-from codesign_bench.config.values import parse_value
+from codesign_bench.config.validation import check_values, kinds_of, stored_values
+from codesign_bench.config.values import parse_value, printable, shown
 from codesign_bench.errors import UserError
 from codesign_bench.method import Method
 from codesign_bench.task import load_task
@@ -117,9 +118,13 @@ def check_overrides(overrides: Iterable[str], method_classes: Sequence[type[Meth
         known += run_keys if prefix in (None, RUN) else []
         if not known:
             choices = ", ".join([RUN, *(method.name for method in method_classes)])
-            raise UserError(f"--set {override}: '{prefix}' is not a selected method; choose from: {choices}")
+            raise UserError(
+                f"--set {printable(override)}: {shown(str(prefix))} is not a selected method; choose from: {choices}"
+            )
         if key not in known:
-            raise UserError(f"--set {override}: unknown key '{key}'; choose from: {', '.join(dict.fromkeys(known))}")
+            raise UserError(
+                f"--set {printable(override)}: unknown key {shown(key)}; choose from: {', '.join(dict.fromkeys(known))}"
+            )
 
 
 def split_override(override: str) -> tuple[str | None, str, str]:
@@ -131,7 +136,7 @@ def split_override(override: str) -> tuple[str | None, str, str]:
     name, equals, text = override.partition("=")
     prefix, dot, key = name.strip().rpartition(".")
     if not equals or not key:
-        raise UserError(f"--set {override}: write it as key=value or method.key=value")
+        raise UserError(f"--set {printable(override)}: write it as key=value or method.key=value")
     return (prefix if dot else None), key, text.strip()
 
 
@@ -144,7 +149,8 @@ def method_config(config_class: type, stored: Settings) -> Any:
     hints = typing.get_type_hints(config_class)
     try:
         values = {name: _restore(hints[name], entry.value) for name, entry in stored.items()}
-        return config_class(**values)
+        with stored_values():
+            return config_class(**values)
     except (KeyError, TypeError, ValueError) as error:
         raise UserError(f"stored configuration incompatible with {config_class.__qualname__}: {error}") from error
 
@@ -181,16 +187,18 @@ def _start(config_class: type, profile: Settings) -> tuple[dict[str, Any], dict[
 
 def _build(config_class: type, values: Mapping[str, Any]) -> Any:
     try:
-        return config_class(**values)
+        config = config_class(**values)
+        check_values(config)
     except ValueError as error:
         raise UserError(f"bad configuration: {error}") from error
+    return config
 
 
 def _parse_field(config_class: type, name: str, text: str) -> Any:
     try:
-        return parse_value(typing.get_type_hints(config_class)[name], text)
+        return parse_value(kinds_of(config_class)[name], text)
     except ValueError as error:
-        raise UserError(f"--set {name}={text}: expected {error}") from error
+        raise UserError(f"--set {name}={printable(text)}: expected {error}") from error
 
 
 def _restore(annotation: Any, value: Any) -> Any:

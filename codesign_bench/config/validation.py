@@ -1,42 +1,44 @@
-"""Checks of hyperparameters: invalid values are reported before anything runs."""
+"""Checks of configurations: a value that its field's declared kind does not allow is reported before anything runs."""
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import fields
+from typing import Any, get_type_hints
+
+from codesign_bench.config.values import check_value
+
+_stored: ContextVar[bool] = ContextVar("stored", default=False)
 
 
-def check_range(config: Any, low: float, high: float, *names: str) -> None:
-    """Check that the fields `names` of a configuration, numbers or tuples of numbers, are in [low, high].
+def kinds_of(config_class: type) -> dict[str, Any]:
+    """Return the declared kind of every field of a configuration, with its limits."""
+    hints = get_type_hints(config_class, include_extras=True)
+    return {field.name: hints[field.name] for field in fields(config_class)}
+
+
+def check_values(config: Any) -> None:
+    """Check that every value of a configuration is of its field's declared kind; numbers must be finite.
 
     Raises:
         ValueError: one is not; names the first.
     """
-    for name in names:
-        value = getattr(config, name)
-        for number in value if isinstance(value, tuple) else (value,):
-            if number is not None and not low <= number <= high:
-                limit = f"at least {low:g}" if high == float("inf") else f"from {low:g} to {high:g}"
-                raise ValueError(f"{name} must be {limit}, not {value}")
+    if _stored.get():
+        return
+    for name, kind in kinds_of(type(config)).items():
+        try:
+            check_value(kind, getattr(config, name))
+        except ValueError as error:
+            raise ValueError(f"{name} must be {error}, not {getattr(config, name)!r}") from None
 
 
-def check_given(config: Any, *names: str) -> None:
-    """Check that the tuples `names` of a configuration are not empty.
-
-    Raises:
-        ValueError: one is empty; names the first.
-    """
-    for name in names:
-        if not getattr(config, name):
-            raise ValueError(f"{name} must have at least one entry")
-
-
-def check_choices(config: Any) -> None:
-    """Check that every literal field of a configuration has one of its choices.
-
-    Raises:
-        ValueError: one does not; names the first and its choices.
-    """
-    for name, hint in get_type_hints(type(config)).items():
-        if get_origin(hint) is Literal and getattr(config, name) not in get_args(hint):
-            choices = ", ".join(f"'{choice}'" for choice in get_args(hint))
-            raise ValueError(f"{name} must be one of {choices}, not '{getattr(config, name)}'")
+@contextmanager
+def stored_values() -> Iterator[None]:
+    """Allow values that are out of today's limits: results of an earlier version remain readable."""
+    token = _stored.set(True)
+    try:
+        yield
+    finally:
+        _stored.reset(token)

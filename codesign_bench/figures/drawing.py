@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import inspect
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from codesign_bench.console import Log, silent
-from codesign_bench.errors import UserError
+from codesign_bench.errors import UserError, in_one_line
 from codesign_bench.figures.comparison import made_otherwise, with_compared
 from codesign_bench.figures.source import Request, Source, curves
-from codesign_bench.registry import load_module, usable_modules
-from codesign_bench.storage.files import Outputs, make_folder
+from codesign_bench.registry import built_in, load_all, load_module, usable_modules
+from codesign_bench.storage.files import Outputs, make_folder, removed_if_refused
 from codesign_bench.storage.frames import stored_curves
 from codesign_bench.storage.tables import csv_bytes
 from codesign_bench.study.study import DEFAULT_STUDY, Study, load_study
@@ -69,21 +69,23 @@ def draw_figures(
     Raises:
         UserError: an unknown figure, a folder that is not writable, or no figure can be drawn.
     """
-    modules = {name: load_module("paper_figs", name) for name in wanted or figure_names(study, log)}
+    request = Request(results, log, named=bool(wanted))
+    modules = _modules(wanted or figure_names(study, log), request)
     if compare is not None and not any(getattr(module, "COMPARES", False) for module in modules.values()):
-        known = {name: load_module("paper_figs", name) for name in usable_modules("paper_figs")}
+        known = _modules(usable_modules("paper_figs"), Request(results, silent))
         choices = [name for name, module in known.items() if getattr(module, "COMPARES", False)]
         raise UserError(f"--compare: {', '.join(wanted)} show no curves; choose from: {', '.join(choices)}")
     if not wanted and not results.is_dir():
         raise UserError(f"no results folder '{results}'; create one with: codesign-bench run --out {results}")
     if compare is not None:
         stored_curves(compare)  # a wrong folder is an error, not a reason to leave the curves out
-    make_folder(f"--out {out}", out)
     drawn: list[Path] = []
-    for drawing in _drawings(modules, Request(results, log, named=bool(wanted)), compare):
-        drawn = [*save(drawing, out), *drawn]  # the first figure is logged last
-    if not drawn:
-        raise UserError(f"nothing in '{results}' can be plotted yet")
+    with removed_if_refused(out):
+        make_folder(f"--out {out}", out)
+        for drawing in _drawings(modules, request, compare):
+            drawn = [*save(drawing, out), *drawn]  # the first figure is logged last
+        if not drawn:
+            raise UserError(f"nothing in '{results}' can be plotted yet")
     for line in made_otherwise(results, compare) if compare is not None else ():
         log(line)
     for path in sorted(drawn, key=lambda path: path.suffix == ".png"):
@@ -96,16 +98,15 @@ def figure_names(study: Study | None, log: Log = silent) -> list[str]:
     `log` names those that cannot be imported in this Python, and why.
     """
     chosen = load_study(DEFAULT_STUDY) if study is None else study
-    of_others = {
-        name for other in usable_modules("studies") if other != chosen.name for name in load_study(other).figures
-    }
+    others = [other for name, other in load_all("studies", "STUDY") if name != chosen.name]
+    of_others = {name for other in others for name in other.figures}
     return [name for name in usable_modules("paper_figs", log) if name in chosen.figures or name not in of_others]
 
 
 def possible_drawings(results: Path, log: Log, study: Study | None = None) -> Iterator[Drawing]:
     """Yield every figure of a study that can be drawn; `log` gets those that are left out, and why."""
-    modules = {name: load_module("paper_figs", name) for name in figure_names(study, log)}
-    return _drawings(modules, Request(results, log))
+    request = Request(results, log)
+    return _drawings(_modules(figure_names(study, log), request), request)
 
 
 def save(drawing: Drawing, out: Path) -> list[Path]:
@@ -132,6 +133,36 @@ def _picture(figure: Figure, ending: str) -> bytes:
     return stream.getvalue()
 
 
+def _modules(wanted: Iterable[str], request: Request) -> dict[str, ModuleType]:
+    """Return the modules of figures; those of other packages that cannot be imported are left out and named.
+
+    Raises:
+        UserError: a figure that was requested by name is unknown, or cannot be imported.
+    """
+    modules = {}
+    for name in wanted:
+        try:
+            modules[name] = load_module("paper_figs", name)
+            _check_module(name, modules[name])
+        except (UserError, TypeError) as error:
+            modules.pop(name, None)
+            if request.named or name in built_in("paper_figs"):
+                raise
+            request.log(f"{name} left out: {error}")
+    return modules
+
+
+def _check_module(name: str, module: ModuleType) -> None:
+    """Check that a module has what a figure must have.
+
+    Raises:
+        TypeError: it has not.
+    """
+    lacking = [part for part in ("TITLE", "data", "draw") if not hasattr(module, part)]
+    if lacking:
+        raise TypeError(f"{module.__name__} is registered as the figure '{name}' and must define {', '.join(lacking)}")
+
+
 def _drawings(modules: Mapping[str, ModuleType], request: Request, compare: Path | None = None) -> Iterator[Drawing]:
     """Yield the figures of `modules` one by one, and free each before the next.
 
@@ -148,11 +179,18 @@ def _drawings(modules: Mapping[str, ModuleType], request: Request, compare: Path
             if compare is not None and getattr(module, "COMPARES", False):
                 frame = with_compared(frame, compare)
             drawing = _draw(name, module, frame)
+            if name not in built_in("paper_figs"):
+                _check_drawing(drawing)
         except UserError as error:
             needs = f"; needs: {module.NEEDS}" if hasattr(module, "NEEDS") else ""
             if request.named:
                 raise UserError(f"{name}: {error}{needs}") from error
             request.log(f"{name} left out: {error}{needs}")
+            continue
+        except (Exception, SystemExit) as error:  # of code that is not ours
+            if request.named or name in built_in("paper_figs"):
+                raise
+            request.log(f"{name} left out, for it has a fault: {in_one_line(error)}")
             continue
         yield drawing
         _close(drawing.figure)
@@ -184,6 +222,14 @@ def _as_drawn(frame: pd.DataFrame) -> pd.DataFrame:
         name: frame[name].map(lambda value: in_figure(value) if isinstance(value, str) else value) for name in names
     }
     return frame.assign(**shown)
+
+
+def _check_drawing(drawing: Drawing) -> None:
+    """Save a drawing to nowhere, so that what is wrong with it shows while it can still be left out."""
+    csv_bytes(drawing.table)
+    drawing.figure.savefig(io.BytesIO(), format="png")
+    for text in drawing.texts.values():
+        text.encode()
 
 
 def _close(figure: Figure) -> None:

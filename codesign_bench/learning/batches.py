@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from codesign_bench.config.run_settings import OVERSHOOT
 from codesign_bench.learning.explorer import Explorer
 from codesign_bench.learning.rollout import Collector
 from codesign_bench.learning.rollout_pool import Group, RolloutPool
@@ -33,26 +34,38 @@ class BatchCollector:
         """Play groups in up to `count` processes; results do not change."""
         self._pool = RolloutPool(self.problem, count) if count > 1 else None
 
-    def collect(self, explorer: Explorer, steps: int, num_slots: int | None = None) -> Trajectories:
+    def collect(
+        self, explorer: Explorer, steps: int, num_slots: int | None = None, most: int | None = None
+    ) -> Trajectories:
         """Return about `steps` environment steps of whole episodes.
+
+        A slot plays episodes until it has taken its share of the steps, so a batch may be up to twice as long as
+        wanted; with `most`, no further episode begins that could exceed it.
 
         Args:
             explorer: chooses designs and controls.
             steps: environment steps wanted; the last episode of every slot is finished.
             num_slots: S, the number of parallel episodes; None: one full-length episode per slot.
+            most: environment steps after which no episode is begun, except the first of every slot; None: no limit.
         """
-        groups = self._groups(steps, num_slots or slots_for(steps, self.problem.task.horizon + 1))
+        groups = self._groups(steps, num_slots or slots_for(steps, self.problem.task.horizon + 1), most)
         if self._pool is not None and len(groups) > 1:
             return joined(self._pool.collect(explorer, groups))
         return joined([group.collect(self._collector, explorer) for group in groups])
 
-    def _groups(self, steps: int, num_slots: int) -> list[Group]:
+    def _groups(self, steps: int, num_slots: int, most: int | None) -> list[Group]:
         groups, first = [], 0
         for index, size in enumerate(group_sizes(num_slots, self.problem.task.max_slots)):
             stream = "rollout" if index == 0 else f"rollout {index}"
-            groups.append(Group(steps * size // num_slots, size, self.streams[stream], first))
+            limit = None if most is None else most * size // num_slots
+            groups.append(Group(steps * size // num_slots, size, self.streams[stream], first, limit))
             first += size
         return groups
+
+
+def most_steps(taken: int, remaining: int) -> int:
+    """Return the longest that the next batch may be, from the steps that a cell has taken and those in its budget."""
+    return remaining + int(OVERSHOOT * (taken + remaining))
 
 
 def slots_for(steps: int, episode_steps: int, most: int | None = None) -> int:

@@ -9,14 +9,15 @@ history: to resume, the same generations are asked and told again, which gives t
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import inf, isnan, nan
-from typing import Any
+from math import isnan, nan
+from typing import Annotated, Any
 
 import cma
 import numpy as np
 
 from codesign_bench.config.search import Integer, LogUniform
-from codesign_bench.config.validation import check_range
+from codesign_bench.config.validation import check_values
+from codesign_bench.config.values import Share, Within
 from codesign_bench.task import Floats
 
 PYCMA = {"source": "pycma's default"}
@@ -26,24 +27,21 @@ PYCMA = {"source": "pycma's default"}
 class EvolutionConfig:
     """Hyperparameters of CMA-ES; the four learning rates are pycma's options of the same meaning."""
 
-    popsize: int = field(default=24, metadata={"search": Integer(6, 32, log=True)})
-    """Candidates of a generation."""
-    sigma0: float = field(default=0.1, metadata={"search": LogUniform(0.05, 0.6)})
+    popsize: Annotated[int, Within(2, 10_000)] = field(default=24, metadata={"search": Integer(6, 32, log=True)})
+    """Candidates of a generation; pycma needs two."""
+    sigma0: Annotated[float, Within(1e-12, 10.0)] = field(default=0.1, metadata={"search": LogUniform(0.05, 0.6)})
     """Initial standard deviation; parameters are in [-1, 1]."""
-    center_learning_rate: float = field(default=1.0, metadata=PYCMA)
+    center_learning_rate: Share = field(default=1.0, metadata=PYCMA)
     """Learning rate of the mean (pycma's `CMA_cmean`)."""
-    covariance_learning_rate: float = field(default=1.0, metadata=PYCMA)
+    covariance_learning_rate: Share = field(default=1.0, metadata=PYCMA)
     """Multiplier of the covariance update (pycma's `CMA_on`)."""
-    rank_mu_learning_rate: float = field(default=1.0, metadata=PYCMA)
+    rank_mu_learning_rate: Share = field(default=1.0, metadata=PYCMA)
     """Multiplier of the rank-mu update (pycma's `CMA_rankmu`)."""
-    rank_one_learning_rate: float = field(default=1.0, metadata=PYCMA)
+    rank_one_learning_rate: Share = field(default=1.0, metadata=PYCMA)
     """Multiplier of the rank-one update (pycma's `CMA_rankone`)."""
 
     def __post_init__(self) -> None:
-        check_range(self, 2, inf, "popsize")  # pycma's own limit
-        check_range(self, 1e-12, inf, "sigma0")
-        check_range(self, 0, 1, "center_learning_rate", "covariance_learning_rate")
-        check_range(self, 0, 1, "rank_mu_learning_rate", "rank_one_learning_rate")
+        check_values(self)
 
 
 class Evolution:

@@ -25,7 +25,13 @@ class Collector:
         self.problem = problem
 
     def collect(
-        self, explorer: Explorer, steps: int, num_slots: int, rng: np.random.Generator, first_slot: int = 0
+        self,
+        explorer: Explorer,
+        steps: int,
+        num_slots: int,
+        rng: np.random.Generator,
+        first_slot: int = 0,
+        most: int | None = None,
     ) -> Trajectories:
         """Play whole episodes in `num_slots` slots until each has taken steps / num_slots steps.
 
@@ -35,10 +41,12 @@ class Collector:
             num_slots: slots to use.
             rng: source of instances and of all noise.
             first_slot: the index of the first of these slots in the batch, as the explorer counts.
+            most: environment steps that further episodes must not exceed, whatever their length; the first episode of
+                every slot is always played. None: no limit.
         """
+        share = max(1, steps // num_slots)
         with self.problem.episodes(num_slots) as episodes:
-            rollout = _Rollout(self.problem, episodes, explorer, max(1, steps // num_slots), num_slots, rng, first_slot)
-            return rollout.play()
+            return _Rollout(self.problem, episodes, explorer, share, num_slots, rng, first_slot, most).play()
 
 
 class _Rollout:
@@ -53,12 +61,13 @@ class _Rollout:
         num_slots: int,
         rng: np.random.Generator,
         first_slot: int,
+        most: int | None,
     ) -> None:
         # A slot may begin its last episode one step before its share is reached, and finishes it.
         task, capacity = problem.task, share + problem.task.horizon + 1
         sizes = task.layout.size, task.control_space.size, task.design_space.size
         self.problem, self.episodes, self.explorer, self.rng = problem, episodes, explorer, rng
-        self.share, self.first_slot = share, first_slot
+        self.share, self.first_slot, self.most = share, first_slot, most
         self.data = Trajectories.empty(num_slots, capacity, *sizes)
         # One draw for all steps: a draw per step would be slower and would depend on which slots are active.
         self.control_noise = rng.standard_normal((num_slots, capacity, explorer.control_noise), dtype=np.float32)
@@ -66,12 +75,14 @@ class _Rollout:
         """(S,) steps that each slot has taken."""
         self.episode = np.zeros(num_slots, dtype=np.intp)
         """(S,) episodes that each slot has begun."""
+        self.latest_end = np.full(num_slots, task.horizon + 1, dtype=np.intp)
+        """(S,) steps that each slot will have taken at most when the episode ends that it plays or plays next."""
 
     def play(self) -> Trajectories:
         """Play until every slot has taken its share of the steps."""
         starting = np.ones(len(self.time), dtype=bool)
         while True:
-            fresh = np.flatnonzero(starting & (self.time < self.share))
+            fresh = self._affordable(np.flatnonzero(starting & (self.time < self.share)))
             if fresh.size:
                 self._design(fresh)
                 starting[fresh] = False
@@ -80,6 +91,16 @@ class _Rollout:
                 return self.data
             ended = self._control(active)
             starting[active[ended]] = True
+
+    def _affordable(self, slots: Slots) -> Slots:
+        """Return those of `slots` (b,) that may begin an episode: all, or as many as the limit leaves room for."""
+        if self.most is None or not slots.size or not self.episode[slots].all():  # first episodes begin together
+            return slots
+        episode = self.problem.task.horizon + 1
+        self.latest_end[slots] = self.time[slots]
+        chosen = slots[: max(0, (self.most - int(self.latest_end.sum())) // episode)]
+        self.latest_end[chosen] += episode
+        return chosen
 
     def _design(self, slots: Slots) -> None:
         """Begin an episode in `slots` (b,) and take its design step."""

@@ -36,10 +36,12 @@ class Group:
     rng: np.random.Generator
     first_slot: int = 0
     """The index of its first slot in the batch."""
+    most: int | None = None
+    """Environment steps that its slots' further episodes must not exceed; None: no limit."""
 
     def collect(self, collector: Collector, explorer: Explorer) -> Trajectories:
         """Play the group with `collector`; this advances the generator."""
-        return collector.collect(explorer, self.steps, self.slots, self.rng, self.first_slot)
+        return collector.collect(explorer, self.steps, self.slots, self.rng, self.first_slot, self.most)
 
 
 class RolloutPool:

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from codesign_bench.learning.actor import Actor, ActorPolicy, GaussianExplorer
-from codesign_bench.learning.batches import BatchCollector, slots_for
+from codesign_bench.learning.batches import BatchCollector, most_steps, slots_for
 from codesign_bench.learning.checkpointing import learner_arrays, load_learner_arrays
 from codesign_bench.learning.compute import Compute
 from codesign_bench.learning.credit import DesignCredit, JointCredit, NoCredit, SeparateCredit, Steps
@@ -91,19 +91,19 @@ class TwoPhaseLearner:
         # From the steps taken and left instead of a counter of batches: batches vary in length, and a resumed cell
         # continues at the same place.
         self.annealing.set(self.env_steps / (self.env_steps + remaining_steps))
-        batch = self.collect(steps, slots)
+        batch = self.collect(steps, slots, most_steps(self.env_steps, remaining_steps))
         self.env_steps += batch.env_steps
         metrics = batch.summary() | self.update(batch)
         gradient_steps = int(metrics["policy_steps"] + metrics.get("design_steps", 0.0))
         return BatchReport(batch.env_steps, metrics, gradient_steps), batch
 
-    def collect(self, steps: int, slots: int) -> Trajectories:
-        """Return about `steps` environment steps of whole episodes, played in at most `slots` slots."""
+    def collect(self, steps: int, slots: int, most: int | None = None) -> Trajectories:
+        """Return about `steps` environment steps of whole episodes, in at most `slots` slots; see `BatchCollector`."""
         explorer: Explorer = GaussianExplorer(self.actor)
         if self.choose_trial is not None:
             trial = self.choose_trial(steps, slots)
             explorer, slots = FixedDesigns(explorer, trial), len(trial.unit_designs)
-        return self.collector.collect(explorer, steps, slots)
+        return self.collector.collect(explorer, steps, slots, most)
 
     def update(self, batch: Trajectories) -> dict[str, float]:
         """Update actor and value networks on a batch; return the logged values."""

@@ -18,7 +18,7 @@ from codesign_bench.code_version import code_version
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.stats import CELL_KEYS
-from codesign_bench.storage.files import make_folder, write_output
+from codesign_bench.storage.files import make_folder, removed_if_refused, write_output
 from codesign_bench.storage.frames import stored_curves
 from codesign_bench.storage.layout import CURVE_COLUMNS
 from codesign_bench.storage.provenance import differences
@@ -83,9 +83,10 @@ def write_report(results: Path, out: Path, log: Log, study: Study | None = None)
     if out.is_dir():
         raise UserError(f"--out {out}: is a folder; give a file in it, e.g. {out / 'report.html'}")
     cells, damaged = read_cells(results)
-    make_folder(f"--out {out}", out.parent)
-    page = gather(results, cells, damaged, study or load_study(DEFAULT_STUDY))
-    write_output(f"--out {out}", out, render(page))
+    with removed_if_refused(out.parent):
+        make_folder(f"--out {out}", out.parent)
+        page = gather(results, cells, damaged, study or load_study(DEFAULT_STUDY))
+        write_output(f"--out {out}", out, render(page))
     log(str(out))
 
 

@@ -10,7 +10,7 @@ import json
 import os
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
@@ -120,6 +120,19 @@ def make_folder(what: str, folder: Path) -> None:
         probe.unlink(missing_ok=True)
     except OSError as error:
         raise UserError(f"{what}: not writable ({reason_of(error)})") from error
+
+
+@contextmanager
+def removed_if_refused(out: Path) -> Iterator[None]:
+    """Remove the folder `out` and those above it if they are new and empty when the `with` block ends with an error."""
+    new = [folder for folder in (out, *out.parents) if not folder.exists()]
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):  # one that is not empty stays, and those above it with it
+            for folder in new:
+                folder.rmdir()
+        raise
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from codesign_bench.cell.axes import axis_named
 from codesign_bench.cell.variant import DEFAULT_NAME, FIRST_AXES, Value, Variant, in_axis_order
+from codesign_bench.config.values import plain_type
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import StoredCell, reported_cells
 from codesign_bench.storage.reading import UnusableFile
@@ -86,7 +87,7 @@ def rows_varying(frame: pd.DataFrame, axis: str) -> pd.DataFrame:
     """Return the rows of cells that vary only this axis."""
     if axis not in frame.columns:
         return frame.iloc[:0]
-    kind = axis_named(axis).kind  # pandas stores a column of integers and NaN as floats
+    kind = plain_type(axis_named(axis).kind)  # pandas stores a column of integers and NaN as floats
     names = {value: Variant.of(**{axis: kind(value)}).name for value in frame[axis].dropna().unique()}
     return frame[frame["variant"] == frame[axis].map(names)]
 

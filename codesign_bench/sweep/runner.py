@@ -12,10 +12,11 @@ import pandas as pd
 from rich.console import Console
 
 from codesign_bench.cell.cell import Cell, ResolvedCell
+from codesign_bench.config.run_settings import OVERSHOOT
 from codesign_bench.console import Log, printer
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores
-from codesign_bench.registry import IMPORTS_VARIABLE
+from codesign_bench.startup import IMPORTS_VARIABLE
 from codesign_bench.storage.cells import StoredCell, stored_record
 from codesign_bench.storage.checkpoint import check_checkpoint
 from codesign_bench.storage.layout import CHECKPOINT_FILE, CURVE_FILE, open_folder, sweep_leftovers
@@ -153,11 +154,11 @@ def run_sweep(
         UserError: bad input, found before anything runs.
         KeyboardInterrupt: the user stopped the sweep; its processes have ended, and the same call resumes it.
     """
-    open_folder(out)
     plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code)
     threads = max((resolved.config.run.threads for resolved in cells), default=1)
     used_jobs, split = split_cores(available_cores(), len(plan.pending), threads, jobs)
     chosen = make_backend(backend, used_jobs, scheduler)
+    open_folder(out)  # once nothing else can be refused: a refused sweep leaves no folder behind
     say = printer(console)
     say(f"{len(cells)} cells, {len(plan.done)} of them already done; results in {out}")
     for note in plan.notes:
@@ -169,10 +170,11 @@ def run_sweep(
         say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
         if not has_locks(out):
             say(f"the file system of {out} has no locks: each running cell is guarded by a file, {HOLDER_FILE}")
+        say(f"cells finish their last episodes: at most {OVERSHOOT:.0%} over the budget, or one smallest batch")
         imported = os.environ.get(IMPORTS_VARIABLE, "")
         queue = [Job(resolved.cell, str(out), retry_failed, imported, same_code) for resolved in plan.pending]
         budgets = {resolved.cell: resolved.config.run.steps for resolved in plan.pending}
-        with chosen as workers, ProgressDisplay(console, out, budgets) as display:
+        with chosen as workers, ProgressDisplay(console, out, budgets, used_jobs) as display:
             _run_queue(queue, workers, display, trouble)
     return _conclude(say, len(cells), trouble, plan)
 
@@ -222,16 +224,24 @@ def _tell(outcome: Outcome, display: ProgressDisplay, trouble: Trouble) -> None:
         trouble.interrupted[outcome.cell] = outcome.message
         display.say(f"interrupted  {outcome.cell.name}  {_one_line(outcome.message)}")
     else:
-        display.say(f"done    {outcome.cell.name}  {_last_row(outcome.cell, display.out)}")
+        display.say(
+            f"done    {outcome.cell.name}  {_last_row(outcome.cell, display.out, display.budgets[outcome.cell])}"
+        )
 
 
-def _last_row(cell: Cell, out: Path) -> str:
+def _last_row(cell: Cell, out: Path, budget: int) -> str:
     try:
         last = pd.read_csv(cell.folder(out) / CURVE_FILE).iloc[-1]
         outcome = f"return {last['return_mean']:.2f}, success {last['success_rate']:.2f}"
-        return f"{outcome}, {last['env_steps']:,.0f} steps, {last['wall_s']:.0f} s"
+        return f"{outcome}, {last['env_steps']:,.0f} steps{over(last['env_steps'], budget)}, {last['wall_s']:.0f} s"
     except (OSError, ValueError, LookupError, TypeError) as error:
         return f"its curve cannot be read ({_one_line(str(error))})"
+
+
+def over(env_steps: float, budget: int) -> str:
+    """Return by how much a cell has exceeded its budget to finish its last episodes, or nothing if by less than 1 %."""
+    share = env_steps / budget - 1.0
+    return f" ({share:.0%} over the budget)" if share >= 0.01 else ""
 
 
 def _refuse_other_configurations(

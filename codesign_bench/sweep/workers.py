@@ -17,8 +17,8 @@ import filelock
 
 from codesign_bench.cell.cell import Cell
 from codesign_bench.errors import UserError
-from codesign_bench.processes import end_with, thread_environment
-from codesign_bench.registry import IMPORTS_VARIABLE
+from codesign_bench.processes import end_with, existing_folder, thread_environment
+from codesign_bench.startup import IMPORTS_VARIABLE
 from codesign_bench.storage.layout import LOG_FILE, PROGRESS_FILE
 from codesign_bench.storage.locks import is_locked, locked
 from codesign_bench.storage.records import DONE, FAILED, INTERRUPTED, RUNNING, CellRecord, Failure
@@ -28,11 +28,13 @@ from codesign_bench.sweep import cell_process
 BUSY = "busy"
 """The outcome of a cell that another sweep is running."""
 START = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); "
+    "import sys; sys.path[:] = filter(None, sys.path); import json; sys.path[:] = json.loads(sys.argv.pop(1)); "
     "from codesign_bench.sweep.cell_process import start; start()"
 )
-"""Starts a cell's process with this process's module path, independent of the working folder."""
+"""Starts a cell's process with this process's module path; nothing is imported from the working folder."""
 SETTLE_SECONDS = 1.0
+STOPPING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+"""Signals by which people and clusters stop a process."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,8 @@ def _run(job: Job, folder: Path) -> Outcome:
     if code > cell_process.EXIT_SYSTEM_ERROR:
         number = code - cell_process.EXIT_SYSTEM_ERROR
         return Outcome(job.cell, INTERRUPTED if is_momentary(number) else FAILED, f"{os.strerror(number)}: {folder}")
+    if -code in STOPPING:  # whoever asked it to stop did not say that the cell is bad
+        return Outcome(job.cell, INTERRUPTED, describe_exit(code))
     return Outcome(job.cell, FAILED, _record_death(folder, code))
 
 
@@ -110,13 +114,15 @@ def _open_log(folder: Path) -> BinaryIO:
 
 
 def _run_process(job: Job, folder: Path) -> int:
-    command = [sys.executable, "-c", START, json.dumps(sys.path), job.cell.to_json(), job.out]
+    path = [entry for entry in sys.path if entry]  # an empty entry is the working folder
+    command = [sys.executable, "-c", START, json.dumps(path), job.cell.to_json(), job.out]
     with _open_log(folder) as log:
         process = subprocess.Popen(
             [*command, *(["retry"] if job.retry_failed else []), *(["same-code"] if job.same_code else [])],
             stdin=subprocess.PIPE,  # never written to; it closes when the parent dies, which ends the process
             stdout=log,
             stderr=log,
+            cwd=existing_folder(),
             env={**thread_environment(), IMPORTS_VARIABLE: job.imported},
         )
         try:

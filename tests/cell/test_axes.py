@@ -108,11 +108,11 @@ def test_fine_tuning_without_a_finished_default_cell_says_what_to_run(tmp_path: 
 @pytest.mark.parametrize(
     ("values", "named"),
     [
-        ({"cutout": 1.0}, r"--cutout must be between 0 and 1 \(both excluded\), not 1"),
-        ({"alpha": -0.1}, "--alpha must be between 0 and 1, not -0.1"),
+        ({"cutout": 1.0}, "--variant cutout=1.0: expected a number above 0 to below 1"),
+        ({"alpha": -0.1}, "--variant alpha=-0.1: expected a number from 0 to 1"),
         ({"scratch": 3}, "--scratch 3: task 'toy_reach' has fine-tuning places 1 to 2"),
         ({"finetune": 0}, "--finetune 0: task 'toy_reach' has fine-tuning places 1 to 2"),
-        ({"setting": -1}, "--variant setting=-1: must not be negative"),
+        ({"setting": -1}, "--variant setting=-1: expected an integer from 0"),
         ({"colour": "red"}, "unknown axis 'colour'; choose from: cutout, alpha, finetune, scratch"),
     ],
 )
@@ -138,7 +138,8 @@ def test_a_task_without_fine_tuning_instances_says_so(capsys: pytest.CaptureFixt
 def test_values_are_read_by_the_kind_of_their_axis() -> None:
     assert parse_axis_value("alpha", "1") == 1.0
     assert parse_axis_value("finetune", "2") == 2
-    with pytest.raises(UserError, match="--variant finetune=half: expected"):
-        parse_axis_value("finetune", "half")
+    for name, text in (("finetune", "half"), ("alpha", "nan"), ("cutout", "1"), ("rung", "-1")):
+        with pytest.raises(UserError, match=f"--variant {name}={text}: expected"):
+            parse_axis_value(name, text)
     assert list(axes())[:4] == ["cutout", "alpha", "finetune", "scratch"]
     assert axis_named("scratch").exclusive == axis_named("finetune").exclusive != ""

@@ -69,7 +69,7 @@ def test_every_axis_of_a_variant_changes_the_problem() -> None:
         ({"profile": "weekend"}, "unknown profile 'weekend'"),
         ({"overrides": ("speed=1",)}, "--set speed=1: unknown key 'speed'"),
         ({"overrides": ("gnn_ppo.epochs=1",)}, "'gnn_ppo' is not a selected method"),
-        ({"variant": Variant.of(alpha=2.0)}, "--alpha must be between 0 and 1, not 2"),
+        ({"variant": Variant.of(alpha=2.0)}, "--variant alpha=2.0: expected a number from 0 to 1"),
     ],
 )
 def test_what_cannot_be_is_refused_whichever_cell_it_is(change: dict[str, Any], told: str) -> None:

@@ -10,4 +10,4 @@ from codesign_bench.cli import main
 @pytest.mark.parametrize("command", [["render", "--out", "push.png"], ["deploy", "--policy", "x"]])
 def test_a_seed_below_zero_is_refused(capsys: pytest.CaptureFixture[str], command: list[str]) -> None:
     assert main([*command, "--seed", "-1"]) == 2
-    assert "argument --seed: a seed must be at least 0, not -1" in capsys.readouterr().err
+    assert "argument --seed: expected an integer from 0 to 4,294,967,295, not '-1'" in capsys.readouterr().err

@@ -11,10 +11,10 @@ from codesign_bench.cli import main
     ("arguments", "message"),
     [
         (["--only", "gnn_poo"], "unknown learner 'gnn_poo'; choose from: gnn_ppo"),
-        (["--epochs", "0"], "--epochs must be at least 1"),
+        (["--epochs", "0"], "--epochs: expected an integer from 1"),
         (["--cores", "4096"], "--cores 4096: there are only"),
         (["--cells", "4096"], "--cores 1 for each of --cells 4096: there are only"),
-        (["--cells", "0"], "--cells must be at least 1"),
+        (["--cells", "0"], "--cells: expected an integer from 1"),
         (["--task", "pull"], "unknown task 'pull'"),
     ],
 )
@@ -29,4 +29,4 @@ def test_bad_input_about_tasks_gets_one_line(capsys: pytest.CaptureFixture[str])
     assert main(["bench", "tasks", "--task", "pull"]) == 2
     assert "unknown task 'pull'" in capsys.readouterr().err
     assert main(["bench", "tasks", "--task", "push", "--seconds", "-1"]) == 2
-    assert "--seconds must be positive" in capsys.readouterr().err
+    assert "--seconds: expected a number above 0 to 86400" in capsys.readouterr().err

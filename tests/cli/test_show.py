@@ -17,10 +17,10 @@ def test_show_tells_the_source_of_every_value(capsys: pytest.CaptureFixture[str]
     assert main(arguments) == 0
     rows = {line.split()[1]: line for line in capsys.readouterr().out.splitlines()}
     assert rows["version"].split() == ["task", "version", "1", "toy_reach"]
-    assert rows["widths"].split(maxsplit=4)[2:] == ["[1,", "2]", "--set"]
+    assert rows["widths"].split()[2:5] == ["[1,", "2]", "--set"]
     assert re.search(r"toy paper, table 1 +0\.01 to 1, log$", rows["step_size"])
     assert re.search(r"toy paper, table 2 +integers 2 to 8$", rows["episodes"])
-    assert rows["steps"].endswith("paper, learning curves")
+    assert re.search(r"paper, learning curves +an integer from 1 to 1,000,000,000,000$", rows["steps"])
 
 
 def test_every_built_in_method_can_be_shown(capsys: pytest.CaptureFixture[str]) -> None:

@@ -34,9 +34,9 @@ def test_the_default_study_plans_the_same_for_all_of_its_methods(capsys: pytest.
     ("arguments", "message"),
     [
         (["--study", "neurips"], "unknown study 'neurips'"),
-        (["--steps", "0"], "--steps must be at least 1, not 0"),
+        (["--steps", "0"], "--steps: expected an integer from 1 to 1,000,000,000,000, not '0'"),
         (["--profile", "slow", "--plan"], "unknown profile 'slow'"),
-        (["--jobs", "0"], "--jobs must be at least 1, not 0"),
+        (["--jobs", "0"], "--jobs: expected an integer from 1 to 4,096, not '0'"),
     ],
 )
 def test_bad_input_gets_one_line(capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:

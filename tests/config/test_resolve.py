@@ -56,8 +56,8 @@ def test_a_prefix_picks_the_method_or_the_run_settings(search: type[Method[Any]]
         ("step_size=-1", "step_size must be positive"),
         ("greedy=perhaps", "true or false"),
         ("widths=8,wide", "an integer"),
-        ("steps=0", "steps must be at least 1"),
-        ("evaluations=0", "evaluations must be at least 1"),
+        ("steps=0", "--set steps=0: expected an integer from 1 to 1,000,000,000,000"),
+        ("evaluations=0", "--set evaluations=0: expected an integer from 1 to 100,000"),
     ],
 )
 def test_a_bad_value_is_the_users_error(search: type[Method[Any]], override: str, named: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -170,3 +171,63 @@ def test_a_figure_that_cannot_be_written_leaves_the_earlier_one_whole(
     with pytest.raises(UserError, match=r"--out .*: mine\.pdf is not writable \(it is a folder\)"):
         draw_figures(["mine"], results, out, print)
     assert {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()} == before
+
+
+def broken(frame: pd.DataFrame) -> Any:
+    """Have a fault."""
+    raise ZeroDivisionError("a fault of its own")
+
+
+def unreadable(frame: pd.DataFrame) -> Figure:
+    """Return a figure that cannot be saved, since its title is no formula."""
+    figure = Figure(figsize=(1.0, 1.0))
+    figure.suptitle(r"$\nothing$")
+    return figure
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [{"SOURCE": broken}, {"data": broken}, {"draw": broken}, {"draw": unreadable}, {"texts": broken}, {"draw": None}],
+    ids=["source", "data", "draw", "saving", "texts", "missing"],
+)
+def test_a_fault_of_another_packages_figure_is_told_and_the_rest_is_drawn(
+    add_figure: AddFigure, results: Path, tmp_path: Path, fault: dict[str, Any]
+) -> None:
+    add_figure("faulty", **fault)
+    add_figure("mine")
+    told: list[str] = []
+    study = Study(name="small", title="Small", question="Is it so?")
+    draw_figures([], results, tmp_path / "out", told.append, study=study)
+    assert (tmp_path / "out" / "mine.png").exists()
+    assert not (tmp_path / "out" / "faulty.png").exists()
+    assert [line for line in told if line.startswith("faulty left out")]
+    assert "mine" in {drawing.name for drawing in possible_drawings(results, told.append, study)}
+    with pytest.raises((ZeroDivisionError, ValueError, TypeError)):
+        draw_figures(["faulty"], results, tmp_path / "out", told.append)
+
+
+def test_a_figure_that_cannot_be_imported_is_told_and_the_rest_is_drawn(
+    add_figure: AddFigure, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add_figure("mine")
+    (tmp_path / "faulty_figure.py").write_text("import nothing_of_this_name\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    group = "codesign_bench.paper_figs"
+    points = {"paper_figs": {"faulty": EntryPoint("faulty", "faulty_figure", group)}}
+    monkeypatch.setattr(registry, "_entry_points", lambda group: points.get(group, {}))
+    told: list[str] = []
+    draw_figures([], results, tmp_path / "out", told.append, study=Study(name="small", title="S", question="?"))
+    assert (tmp_path / "out" / "mine.png").exists()
+    assert "left out: faulty: it needs nothing_of_this_name, which is not installed" in told
+    with pytest.raises(UserError, match="figure 'faulty' is not available: it needs nothing_of_this_name"):
+        draw_figures(["faulty"], results, tmp_path / "out", told.append)
+
+
+def test_a_refused_figure_leaves_no_folder_behind(add_figure: AddFigure, results: Path, tmp_path: Path) -> None:
+    add_figure("mine", SOURCE=lacking)
+    (tmp_path / "there").mkdir()
+    for out in (tmp_path / "new" / "figures", tmp_path / "there"):
+        with pytest.raises(UserError, match="nothing measured"):
+            draw_figures(["mine"], results, out, print)
+    assert not (tmp_path / "new").exists()
+    assert (tmp_path / "there").exists()

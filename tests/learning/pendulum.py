@@ -52,7 +52,7 @@ OURS: dict[str, Any] = {
     "clip_ratio": STABLE_BASELINES3["clip_range"],
     "max_gradient_norm": STABLE_BASELINES3["max_grad_norm"],
     "entropy_weight": STABLE_BASELINES3["ent_coef"],
-    "kl_threshold": float("inf"),
+    "kl_threshold": 1e6,
     "control_log_std": math.log(1.0 / MAX_TORQUE),
     "fix_std": False,
     "policy_net": (64, 64),

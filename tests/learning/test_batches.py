@@ -2,9 +2,23 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from codesign_bench.learning.batches import group_sizes, slots_for
+from codesign_bench.learning.batches import BatchCollector, group_sizes, most_steps, slots_for
+from codesign_bench.learning.explorer import Explorer, Sample
+from codesign_bench.method import Problem
+from codesign_bench.seeding import Streams
+from codesign_bench.task import Singles, Slots, load_task
+
+
+class Noise(Explorer):
+    """Designs and controls that are noise alone."""
+
+    def sample_design(self, slots: Slots, observation: Singles, noise: Singles) -> Sample:
+        return Sample(np.clip(noise, -1.0, 1.0))
+
+    sample_control = sample_design
 
 
 @pytest.mark.parametrize(
@@ -33,3 +47,29 @@ def test_how_slots_are_grouped_follows_from_their_number_and_the_tasks_most(
 )
 def test_as_many_slots_as_give_whole_episodes(steps: int, most: int | None, expected: int) -> None:
     assert slots_for(steps, episode_steps=6, most=most) == expected
+
+
+def noise_for(problem: Problem) -> Noise:
+    return Noise(problem.task.design_space.size, problem.task.control_space.size)
+
+
+@pytest.mark.parametrize("remaining", [100, 1_000, 5_000, 9_885, 20_000])
+def test_the_last_batch_exceeds_its_budget_by_at_most_two_percent_or_an_episode(remaining: int) -> None:
+    # Wherever the number of slots is rounded down, each would play a second episode to the end.
+    problem = Problem(load_task("push"))
+    episode = problem.task.horizon + 1
+    most = most_steps(20_000 - remaining, remaining)
+    explorer = noise_for(problem)
+    steps = min(remaining, 10_000)
+    batch = BatchCollector(problem, Streams(0)).collect(explorer, steps, most=most)
+    first_episodes = slots_for(steps, episode) * episode
+    assert batch.env_steps <= max(most, first_episodes) <= remaining + max(400, episode)
+
+
+def test_a_limit_that_leaves_room_changes_no_number() -> None:
+    problem = Problem(load_task("push"))
+    free, limited = (
+        BatchCollector(problem, Streams(0)).collect(noise_for(problem), 1_000, most=most) for most in (None, 5_000)
+    )
+    assert free.reward.tobytes() == limited.reward.tobytes()
+    assert free.env_steps == limited.env_steps

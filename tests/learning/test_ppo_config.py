@@ -29,6 +29,9 @@ from codesign_bench.method import load_method
         (PerceptronConfig(), {"value_net": ()}),
         (EvolutionConfig(), {"popsize": 1}),
         (EvolutionConfig(), {"sigma0": 0.0}),
+        (EvolutionConfig(), {"sigma0": float("inf")}),
+        (PPOConfig(), {"control_log_std": float("nan")}),
+        (PPOConfig(), {"batch_size": 10**15}),
     ],
 )
 def test_a_value_out_of_range_is_named(config: Any, change: dict[str, Any]) -> None:
@@ -40,8 +43,8 @@ def test_a_value_out_of_range_is_named(config: Any, change: dict[str, Any]) -> N
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"design_credit": "shared"}, "design_credit must be one of 'joint', 'separate', not 'shared'"),
-        ({"precision": "half"}, "precision must be one of 'fp32', 'bf16', not 'half'"),
+        ({"design_credit": "shared"}, "design_credit must be one of joint, separate, not 'shared'"),
+        ({"precision": "half"}, "precision must be one of fp32, bf16, not 'half'"),
     ],
 )
 def test_an_unknown_choice_is_named_with_those_there_are(change: dict[str, Any], message: str) -> None:

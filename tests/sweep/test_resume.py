@@ -209,3 +209,63 @@ def test_two_sweeps_on_one_folder_share_the_work(tmp_path: Path) -> None:
     frame = load_results(tmp_path)
     assert not frame.duplicated(["seed", "env_steps"]).any()
     assert frame.groupby("seed")["env_steps"].max().ge(300).all()
+
+
+def test_a_sweep_goes_on_when_nobody_reads_its_output(tmp_path: Path, gate: Gate) -> None:
+    process = interruptible(tmp_path, gate)
+    assert process.stdout is not None
+    process.stdout.close()
+    gate.open()
+    assert process.wait(timeout=PATIENCE_SECONDS) == 0
+    assert process.stderr is not None
+    assert process.stderr.read() == ""
+    assert len(load_results(tmp_path)["seed"].unique()) == 2
+
+
+def test_a_sweep_goes_on_when_the_disk_behind_its_output_is_full(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "codesign_bench", *ARGUMENTS, "--steps", "200", "--out", str(tmp_path)]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=PATIENCE_SECONDS)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert "No space left on device" in done.stderr
+    assert len(load_results(tmp_path)["seed"].unique()) == 1
+
+
+def test_sigterm_reads_as_stopped_and_the_same_command_resumes(tmp_path: Path, gate: Gate) -> None:
+    process = interruptible(tmp_path, gate)
+    process.terminate()
+    assert finish(process)[0] == 130
+    wait_for(lambda: not any(map(is_locked, cell_folders(tmp_path))))
+    counts = finish(start("status", "--results", tmp_path))[1].splitlines()[-1]
+    assert "interrupted" in counts
+    assert "done" not in counts
+
+
+def test_a_cell_that_somebody_stops_is_interrupted_and_not_failed(tmp_path: Path, gate: Gate) -> None:
+    process = interruptible(tmp_path, gate)
+    folder = next(tmp_path.glob(f"*/*/*/*/{CHECKPOINT_FILE}")).parent
+    record = CellRecord.read(folder)
+    assert record is not None
+    os.kill(int(record.pid or 0), signal.SIGTERM)
+    gate.open()
+    code, text = finish(process)
+    assert (code, "killed by SIGTERM; the same command resumes it" in text) == (1, True)
+    stopped = CellRecord.read(folder)
+    assert stopped is not None
+    assert stopped.status == "running", "which reads as interrupted where no process holds the lock"
+    assert finish(start(*ARGUMENTS, *SLOW, "--steps", str(STEPS), "--seeds", "2", "--out", tmp_path))[0] == 0
+
+
+def test_a_deleted_working_folder_stops_nothing_that_has_absolute_paths(tmp_path: Path) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    line = "import os, sys; os.rmdir(os.getcwd()); os.execv(sys.executable, [sys.executable, '-m', *sys.argv[1:]])"
+    words = [sys.executable, "-c", line, "codesign_bench", *ARGUMENTS, "--steps", "200"]
+    for out, code, told in ((str(tmp_path / "runs"), 0, ""), ("runs", 2, "the working folder was deleted")):
+        gone.mkdir(exist_ok=True)
+        done = subprocess.run(
+            [*words, "--out", out], cwd=gone, capture_output=True, text=True, timeout=PATIENCE_SECONDS
+        )
+        assert (done.returncode, told in done.stderr) == (code, True), done.stdout + done.stderr
+        assert len(done.stderr.splitlines()) <= 1

@@ -248,6 +248,7 @@ ALLOWED = {
     ("pid", "null"),
     ("code", "null"),
     ("code", "an object"),
+    ("host", "an object"),
 }
 """Entries and values that mean something or nothing."""
 

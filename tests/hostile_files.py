@@ -105,7 +105,8 @@ OF_ANY_FILE: Mapping[str, Change] = {
     "eight gigabytes of nothing": _replace(_sparse),
     "empty": _content(lambda content: b""),
     "one line end": _content(lambda content: b"\n"),
-    "its first half": _content(lambda content: content[: len(content) // 2]),
+    # Not at the end of a row: tables beside the cells have no checksum by which whole rows would be missed.
+    "its first half": _content(lambda content: content[: len(content) // 2].rstrip(b"\n")),
     "without its last bytes": _content(lambda content: content[:-3]),
     "zeros of its length": _content(lambda content: bytes(len(content))),
     "zeros at its end": _content(lambda content: content + bytes(4096)),

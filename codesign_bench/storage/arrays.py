@@ -98,6 +98,8 @@ def checked_header(stream: BinaryIO) -> dict[str, Any]:
         found = _checksum((name, _pieces(stream, *ends)) for name, ends in offsets.items())
     except DAMAGED_HEADER as error:
         raise ValueError("damaged or not written by codesign-bench") from error
+    if os.fstat(stream.fileno()).st_size != max((end for _, end in offsets.values()), default=8 + size):
+        raise ValueError("damaged: something is missing or added at its end")
     if expected != found:
         raise ValueError("damaged: its checksum does not match")
     return header

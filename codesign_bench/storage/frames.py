@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from codesign_bench.cell.axes import axis_named
 from codesign_bench.cell.variant import DEFAULT_NAME, FIRST_AXES, Value, Variant, in_axis_order
@@ -14,6 +14,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import StoredCell, reported_cells
 from codesign_bench.storage.reading import UnusableFile
 from codesign_bench.storage.survey import survey
+from codesign_bench.visible_text import on_one_line
 
 if TYPE_CHECKING:  # pandas takes a second to import; cell processes do not need it
     import pandas as pd
@@ -40,7 +41,7 @@ def load_results(out: str | Path) -> pd.DataFrame:
         UserError: the folder does not exist or contains no results.
     """
     for problem in survey(Path(out)):
-        warnings.warn(f"left out: {problem}", LeftOutWarning, stacklevel=2)
+        warnings.warn(on_one_line(f"left out: {problem}"), LeftOutWarning, stacklevel=2)
     return stored_curves(out)
 
 
@@ -88,8 +89,16 @@ def rows_varying(frame: pd.DataFrame, axis: str) -> pd.DataFrame:
     if axis not in frame.columns:
         return frame.iloc[:0]
     kind = plain_type(axis_named(axis).kind)  # pandas stores a column of integers and NaN as floats
-    names = {value: Variant.of(**{axis: kind(value)}).name for value in frame[axis].dropna().unique()}
+    names = {value: _name(axis, kind, value) for value in frame[axis].dropna().unique()}
     return frame[frame["variant"] == frame[axis].map(names)]
+
+
+def _name(axis: str, kind: type[Value], value: Any) -> str | None:
+    """Return the name of the variant that varies only this axis, or None if the axis has no such value."""
+    try:
+        return Variant.of(**{axis: kind(value)}).name
+    except ValueError:
+        return None
 
 
 def require_columns(frame: pd.DataFrame, columns: Sequence[str], what: str) -> None:

@@ -84,7 +84,7 @@ def _other_code(one: Conditions, other: Conditions) -> bool:
 def code(conditions: Conditions) -> str:
     """Return which code it was: its commit, or the fingerprint of its files where no commit says it all."""
     told = conditions["code"]
-    files = f"files {told.get('fingerprint', '')[:SHORT]}"
+    files = f"files {(told.get('fingerprint') or '')[:SHORT]}"
     if told.get("commit") is None:
         return files if told.get("fingerprint") else NOT_RECORDED
     return told["commit"][:SHORT] + (f" with changes ({files})" if told.get("changed") else "")

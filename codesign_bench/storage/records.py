@@ -26,6 +26,9 @@ RESTART = "delete its folder to restart the cell"
 FORMER_LABELS = {"GNN-PPO (paper's)": "GNN-PPO"}
 """Labels in stored cells that are the same for both credits of the design step -> the method's label since."""
 
+FIRST_AXES_HOLD = dict(zip(FIRST_AXES, (number, number, whole, whole), strict=True))
+"""Axis -> how its value is read; those of other axes may be anything."""
+
 RUNNING, DONE, FAILED = "running", "done", "failed"
 INTERRUPTED = "interrupted"
 """Not stored: the status of a cell that is recorded as running while no process holds its lock."""
@@ -97,7 +100,7 @@ class CellRecord:
     @property
     def threads(self) -> int:
         """Number of cores of the cell."""
-        return int(self.host.get("threads", 1))
+        return int(self.host.get("threads") or 1)
 
     @property
     def conditions(self) -> dict[str, Any]:
@@ -182,7 +185,7 @@ class CellRecord:
             # absent from cells of tasks that had not changed yet
             task_version=whole(content, "task_version") if "task_version" in content else 1,
             method=text(content, "method"),
-            variant=Variant.from_json(axes),
+            variant=_variant(axes),
             seed=whole(content, "seed"),
             profile=text(content, "profile"),
             label=_label(content),
@@ -219,6 +222,14 @@ def _label(content: Mapping[str, Any]) -> str:
         return label
     credit = content["config"]["method"].get("design_credit", {}).get("value")
     return FORMER_LABELS[label] if credit is None else f"{FORMER_LABELS[label]}, {credit} credit"
+
+
+def _variant(axes: Mapping[str, Any]) -> Variant:
+    """Return the variant, whose values on the first axes must be of these axes' types."""
+    variant = Variant.from_json(axes)
+    for axis, read in FIRST_AXES_HOLD.items():
+        optional(read, axes, axis)
+    return variant
 
 
 def _config(content: Mapping[str, Any]) -> StoredConfig:

@@ -84,6 +84,12 @@ def test_a_flipped_bit_is_found_without_loading(path: Path) -> None:
         check_arrays(path)
 
 
+def test_bytes_that_are_added_at_its_end_are_found(path: Path) -> None:
+    path.write_bytes(path.read_bytes() + bytes(8))
+    with pytest.raises(DamagedFile, match="missing or added at its end"):
+        check_arrays(path)
+
+
 def test_what_is_no_file_of_arrays_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "loop").symlink_to("loop")

@@ -38,6 +38,7 @@ def test_a_finished_cell_holds_curve_configuration_versions_and_policy(tmp_path:
     assert len(steps) == 5
     assert frame["env_steps"].is_monotonic_increasing
     assert frame["env_steps"].is_unique
+    assert set(stored(CELL, tmp_path).checksums) == {"curve.csv", "evaluation.csv"}
     assert frame["wall_s"].is_monotonic_increasing
     record = stored(CELL, tmp_path)
     assert record.status == "done"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -39,6 +40,25 @@ def test_a_second_run_skips_what_is_done_and_runs_what_is_new(tmp_path: Path) ->
     assert "2 cells, 1 of them already done" in text
     assert (CELL.folder(tmp_path) / "curve.csv").read_bytes() == before
     assert load_results(tmp_path)["seed"].unique().tolist() == [0, 1]
+
+
+def test_a_finished_cell_whose_curve_has_changed_is_told_and_left_alone(tmp_path: Path) -> None:
+    sweep(cells(2), tmp_path)
+    curve = CELL.folder(tmp_path) / "curve.csv"
+    curve.write_text(curve.read_text() + curve.read_text().splitlines(keepends=True)[-1])
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    for retry_failed in (False, True):
+        code, text = sweep(cells(2), tmp_path, retry_failed=retry_failed)
+        assert code == 1
+        assert "curve.csv: its checksum does not match; delete its folder to run it again" in " ".join(text.split())
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_a_copy_of_another_cell_is_never_taken_for_the_cell(tmp_path: Path) -> None:
+    sweep(cells(1), tmp_path)
+    shutil.copytree(CELL.folder(tmp_path), CELL.folder(tmp_path).with_name("seed-01"))
+    with pytest.raises(UserError, match=r"seed-01.*is that of the cell toy_reach/toy_search/default/seed-00"):
+        sweep(cells(2), tmp_path)
 
 
 def test_the_curve_does_not_depend_on_the_number_of_jobs(tmp_path: Path) -> None:

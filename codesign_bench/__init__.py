@@ -5,9 +5,9 @@ Importing the package imports no method, no simulator and no torch; its names ar
 
 from __future__ import annotations
 
-from codesign_bench import startup
+from codesign_bench.startup import prepare as _prepare
 
-startup.prepare()  # before any other import: it settles where modules come from
+_prepare()  # before any other import: it settles where modules come from
 
 # isort: split
 from importlib import import_module  # noqa: E402

@@ -18,8 +18,8 @@ def test_show_tells_the_source_of_every_value(capsys: pytest.CaptureFixture[str]
     rows = {line.split()[1]: line for line in capsys.readouterr().out.splitlines()}
     assert rows["version"].split() == ["task", "version", "1", "toy_reach"]
     assert rows["widths"].split()[2:5] == ["[1,", "2]", "--set"]
-    assert re.search(r"toy paper, table 1 +0\.01 to 1, log$", rows["step_size"])
-    assert re.search(r"toy paper, table 2 +integers 2 to 8$", rows["episodes"])
+    assert re.search(r"toy paper, table 1 +a number +0\.01 to 1, log$", rows["step_size"])
+    assert re.search(r"toy paper, table 2 +an integer +integers 2 to 8$", rows["episodes"])
     assert re.search(r"paper, learning curves +an integer from 1 to 1,000,000,000,000$", rows["steps"])
 
 

@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.y*ml"))
-SCRIPTS = sorted((ROOT / ".ci").iterdir())
+SCRIPTS = sorted((ROOT / ".ci").glob("*"))
 LEFT_OUT = shutil.ignore_patterns(".*", "*.egg-info", "build", "dist", "__pycache__", "results")
 
 

@@ -86,7 +86,10 @@ def test_a_module_that_is_named_is_found_here_by_every_process_and_no_other_is(f
     assert "it imports 'helper', which is not found" in refused.stderr
     (folder / "mine.py").write_text("1 / 0\n")
     faulty = ask("script", *words, folder=folder)
-    assert faulty.stderr == "codesign-bench: --import mine: ZeroDivisionError: division by zero (mine.py, line 1)\n"
+    assert (
+        faulty.stderr
+        == "codesign-bench: --import mine is not available: ZeroDivisionError: division by zero (mine.py, line 1)\n"
+    )
 
 
 def test_a_library_wins_over_a_module_of_the_folder_that_is_named_like_it(folder: Path) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from codesign_bench.startup import SAFE_PATH_VARIABLE
 
@@ -26,9 +28,18 @@ def thread_environment() -> dict[str, str]:
     return {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1"), SAFE_PATH_VARIABLE: "1"}
 
 
-def keep_modules_of_children_safe() -> None:
+@contextmanager
+def children_with_safe_modules() -> Iterator[None]:
     """Keep the working folder off the module path of every process that this one starts, directly or by a library."""
+    before = os.environ.get(SAFE_PATH_VARIABLE)
     os.environ[SAFE_PATH_VARIABLE] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop(SAFE_PATH_VARIABLE, None)
+        else:
+            os.environ[SAFE_PATH_VARIABLE] = before
 
 
 def existing_folder() -> str | None:

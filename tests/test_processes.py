@@ -9,7 +9,13 @@ from collections.abc import Iterator
 
 import pytest
 
-from codesign_bench.processes import EXIT_ORPHANED, THREAD_VARIABLES, thread_environment
+from codesign_bench.processes import (
+    EXIT_ORPHANED,
+    THREAD_VARIABLES,
+    children_with_safe_modules,
+    thread_environment,
+)
+from codesign_bench.startup import SAFE_PATH_VARIABLE
 
 SLEEPER = (
     "import os, sys, time\n"
@@ -60,3 +66,15 @@ def test_an_orphan_ends_with_a_code_of_its_own_and_others_go_on() -> None:
     assert orphaned.returncode == EXIT_ORPHANED
     own = [sys.executable, "-c", SLEEPER.format(seconds=0.01), str(os.getpid())]
     assert subprocess.run(own, capture_output=True).returncode == 0
+
+
+@pytest.mark.parametrize("before", [None, "", "1"])
+def test_the_module_path_of_children_is_safe_only_meanwhile(
+    before: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(SAFE_PATH_VARIABLE, raising=False)
+    if before is not None:
+        monkeypatch.setenv(SAFE_PATH_VARIABLE, before)
+    with children_with_safe_modules():
+        assert os.environ[SAFE_PATH_VARIABLE] == "1"
+    assert os.environ.get(SAFE_PATH_VARIABLE) == before

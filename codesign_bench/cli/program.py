@@ -17,7 +17,7 @@ from codesign_bench.cli.arguments import module_name
 from codesign_bench.console import steady_streams
 from codesign_bench.errors import UserError
 from codesign_bench.plugins import import_modules
-from codesign_bench.processes import existing_folder, keep_modules_of_children_safe
+from codesign_bench.processes import children_with_safe_modules, existing_folder
 from codesign_bench.startup import (
     EXIT_INTERRUPTED,
     PROGRAM,
@@ -66,8 +66,7 @@ class _Parser(argparse.ArgumentParser):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code."""
-    keep_modules_of_children_safe()
-    with steady_streams(PROGRAM):
+    with children_with_safe_modules(), steady_streams(PROGRAM):
         try:
             return _run(arguments)
         except KeyboardInterrupt:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from codesign_bench.cell.axes import BUILT_IN
-from codesign_bench.cli.arguments import OfKind, module_name, path
+from codesign_bench.cli.arguments import OfKind, module_name, out_file, out_folder, path
 from codesign_bench.cli.program import build_parser
 from codesign_bench.config.run_settings import RunSettings
 from codesign_bench.config.validation import kinds_of
@@ -98,8 +98,9 @@ def invalid_values(action: argparse.Action) -> Iterator[str]:
         yield from ("", "x", "CPU", LONG)
     elif isinstance(action.type, OfKind):
         yield from outside(action.type.kind)
-    elif action.type is path:
+    elif action.type in (path, out_folder, out_file):
         yield from NO_PATH
+        yield from [] if action.type is path else ["/dev/null/new", "/dev/null/new/file.png"]
     elif action.type is module_name:
         yield from NO_MODULE
 

@@ -16,7 +16,7 @@ from codesign_bench.cli.arguments import (
     add_out,
     add_profile,
     add_study,
-    path,
+    out_folder,
 )
 from codesign_bench.config.profiles import profile_named
 from codesign_bench.study import load_study
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_out(parser, DEFAULT_RESULTS)
     parser.add_argument(
         "--figures",
-        type=path,
+        type=out_folder,
         default=DEFAULT_FIGURES,
         metavar="DIR",
         help=f"output folder of figures; default: {DEFAULT_FIGURES}",

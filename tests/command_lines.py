@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from codesign_bench.cell.axes import BUILT_IN
-from codesign_bench.cli.arguments import OfKind, module_name, path
+from codesign_bench.cli.arguments import OfKind, module_name, out_file, out_folder, path
 from codesign_bench.cli.program import build_parser
 from codesign_bench.config.run_settings import RunSettings
 from codesign_bench.config.validation import kinds_of
@@ -42,6 +42,7 @@ NO_NUMBER = (
     "9" * 5_000,
     "1\0",
 )
+NO_SEEDS = ("0", "-1", "1.5", "99999999", "0-99999999", "5-2", "1,", ",", "1-2-3", "1,,2", "4294967296-")
 NO_PATH = ("", " ", "a\0b", LONG, "/".join(["y" * 200] * 40))
 NO_MODULE = ("", " ", ".", "..", ".a", "a.", "a b", "a-b", "1a", "a/b", "a.py/", "a\0b", LONG)
 REQUIRED = {
@@ -97,8 +98,9 @@ def invalid_values(action: argparse.Action) -> Iterator[str]:
         yield from ("", "x", "CPU", LONG)
     elif isinstance(action.type, OfKind):
         yield from outside(action.type.kind)
-    elif action.type is path:
+    elif action.type in (path, out_folder, out_file):
         yield from NO_PATH
+        yield from [] if action.type is path else ["/dev/null/new", "/dev/null/new/file.png"]
     elif action.type is module_name:
         yield from NO_MODULE
 
@@ -176,20 +178,7 @@ def of_axes() -> Iterator[Line]:
                 yield Line((*start, "--variant", f"{name}={value}"), "--variant")
     for text in ("", "=", "x", "=1", "no_such_axis=1", "alpha", "alpha="):
         yield Line((*start, "--variant", text), "axis" if "no_such" in text else "--variant")
-    for seeds in (
-        *NO_NUMBER,
-        "0",
-        "-1",
-        "1.5",
-        "99999999",
-        "0-99999999",
-        "5-2",
-        "1,",
-        ",",
-        "1-2-3",
-        "1,,2",
-        "4294967296-",
-    ):
+    for seeds in (*[text for text in NO_NUMBER if "," not in text], *NO_SEEDS):
         yield Line((*start, f"--seeds={seeds}"), "--seeds")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -28,11 +29,11 @@ Jobs = Threads
 """How many cells may run at a time: as many as there may be cores."""
 
 
-def add_results(parser: argparse.ArgumentParser) -> None:
-    """Add `--results`, the folder that a command reads."""
+def add_results(parser: argparse.ArgumentParser, check: Callable[[str], Path] | None = None) -> None:
+    """Add `--results`, the folder that a command reads; `check` is another parser, for one that also writes there."""
     parser.add_argument(
         "--results",
-        type=path,
+        type=check or path,
         default=DEFAULT_RESULTS,
         metavar="DIR",
         help=f"results folder; default: {DEFAULT_RESULTS}",
@@ -41,8 +42,10 @@ def add_results(parser: argparse.ArgumentParser) -> None:
 
 def add_out(parser: argparse.ArgumentParser, default: Path, metavar: str = "DIR") -> None:
     """Add `--out`, the file or folder that a command writes."""
-    kind = "file" if metavar == "FILE" else "folder"
-    parser.add_argument("--out", type=path, default=default, metavar=metavar, help=f"output {kind}; default: {default}")
+    kind, check = ("file", out_file) if metavar == "FILE" else ("folder", out_folder)
+    parser.add_argument(
+        "--out", type=check, default=default, metavar=metavar, help=f"output {kind}; default: {default}"
+    )
 
 
 def add_profile(parser: argparse.ArgumentParser) -> None:
@@ -137,6 +140,46 @@ def path(text: str) -> Path:
     if len(os.fsencode(text)) > LONGEST_PATH or any(len(os.fsencode(part)) > LONGEST_NAME for part in Path(text).parts):
         raise argparse.ArgumentTypeError(f"expected a shorter path than {shown(text)}")
     return Path(text)
+
+
+def out_folder(text: str) -> Path:
+    """Return the path of a folder that can be written, or made, as far as can be told without doing it.
+
+    Raises:
+        ArgumentTypeError: it cannot; nobody should learn that after hours.
+    """
+    chosen = path(text)
+    _check_writable(chosen, text)
+    return chosen
+
+
+def out_file(text: str) -> Path:
+    """Return the path of a file that can be written, as far as can be told without doing it.
+
+    Raises:
+        ArgumentTypeError: it cannot.
+    """
+    chosen = path(text)
+    _check_writable(chosen.parent, text)
+    if chosen.is_dir():
+        raise argparse.ArgumentTypeError(f"{printable(text)}: is a folder; give a file in it")
+    return chosen
+
+
+def _check_writable(folder: Path, text: str) -> None:
+    """Check that a folder can be written or made; `text` is what the user gave.
+
+    Raises:
+        ArgumentTypeError: it cannot.
+    """
+    try:
+        existing = next(part for part in (folder, *folder.parents) if part.exists() or part.is_symlink())
+        fault = 0 if os.access(existing, os.W_OK | os.X_OK) else errno.EACCES
+        fault = fault if existing.is_dir() else errno.ENOTDIR
+    except OSError as error:
+        fault = error.errno or errno.EACCES
+    if fault:
+        raise argparse.ArgumentTypeError(f"{printable(text)}: not writable ({os.strerror(fault)})")
 
 
 def module_name(text: str) -> str:

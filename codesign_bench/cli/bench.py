@@ -7,7 +7,7 @@ from typing import Annotated
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import ALL, Jobs, OfKind, chosen_tasks, path
+from codesign_bench.cli.arguments import ALL, Jobs, OfKind, chosen_tasks, out_file
 from codesign_bench.config.profiles import profile_named
 from codesign_bench.config.values import Within
 from codesign_bench.console import printer
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     learner.add_argument("--epochs", type=OfKind(Passes), default=10, metavar="N", help="epochs per batch; default: 10")
     learner.add_argument("--repeats", type=OfKind(Passes), default=3, metavar="N", help="timed batches; default: 3")
     learner.add_argument("--only", nargs="+", metavar="NAME", help="names of learners; default: all")
-    learner.add_argument("--out", type=path, metavar="FILE", help="also write the numbers to this JSON file")
+    learner.add_argument("--out", type=out_file, metavar="FILE", help="also write the numbers to this JSON file")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import OfKind, path
+from codesign_bench.cli.arguments import OfKind, out_folder, path
 from codesign_bench.config.values import Within
 from codesign_bench.console import printer
 
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--instances", metavar="N,...", help="tools for these evaluation instances; default: all of them"
     )
     parser.add_argument("--scale", type=OfKind(Scale), default=1.0, metavar="S", help="scale of the print; default: 1")
-    parser.add_argument("--out", type=path, required=True, metavar="DIR", help="output folder")
+    parser.add_argument("--out", type=out_folder, required=True, metavar="DIR", help="output folder")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

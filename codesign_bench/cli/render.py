@@ -8,7 +8,7 @@ from typing import Annotated
 from rich.console import Console
 
 from codesign_bench.cell.grid import Seed
-from codesign_bench.cli.arguments import OfKind, path
+from codesign_bench.cli.arguments import OfKind, out_file, path
 from codesign_bench.config.values import Within
 from codesign_bench.console import printer
 from codesign_bench.errors import UserError
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--behaviour", choices=("random", "script"), help="used without --policy; default: the task's script"
     )
     parser.add_argument(
-        "--out", type=path, required=True, metavar="FILE", help="output file, .gif (animation) or .png (picture)"
+        "--out", type=out_file, required=True, metavar="FILE", help="output file, .gif (animation) or .png (picture)"
     )
     parser.add_argument(
         "--episodes", type=OfKind(Episodes), default=4, metavar="N", help="number of episodes; default: 4"

@@ -17,7 +17,7 @@ from codesign_bench.cli.arguments import (
     add_profile,
     add_same_code,
     add_study,
-    path,
+    out_folder,
 )
 from codesign_bench.config.profiles import profile_named
 from codesign_bench.study import load_study
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_same_code(parser)
     parser.add_argument(
         "--figures",
-        type=path,
+        type=out_folder,
         default=DEFAULT_FIGURES,
         metavar="DIR",
         help=f"output folder of figures; default: {DEFAULT_FIGURES}",

@@ -8,7 +8,15 @@ from pathlib import Path
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import OfKind, add_jobs, add_profile, add_same_code, add_study, add_sweep, path
+from codesign_bench.cli.arguments import (
+    OfKind,
+    add_jobs,
+    add_profile,
+    add_same_code,
+    add_study,
+    add_sweep,
+    out_folder,
+)
 from codesign_bench.config.run_settings import Steps
 from codesign_bench.console import printer
 from codesign_bench.study import load_study
@@ -27,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--plan", action="store_true", help="print the rungs and the steps that they take, and stop")
     parser.add_argument(
-        "--out", type=path, metavar="DIR", help=f"output folder; default: {DEFAULT_FOLDER}/<name of the study>"
+        "--out", type=out_folder, metavar="DIR", help=f"output folder; default: {DEFAULT_FOLDER}/<name of the study>"
     )
     add_jobs(parser)
     add_sweep(parser)

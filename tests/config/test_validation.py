@@ -10,7 +10,7 @@ import pytest
 from codesign_bench.config.validation import check_values, kinds_of, stored_values
 from codesign_bench.config.values import Length, Share, Within
 from codesign_bench.method import load_method
-from codesign_bench.registry import built_in
+from codesign_bench.registry import presented
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def test_values_that_were_stored_under_other_limits_remain_readable() -> None:
         check_values(Settings(rate=7.0))
 
 
-@pytest.mark.parametrize("method", built_in("methods"))
+@pytest.mark.parametrize("method", presented("methods"))
 def test_every_number_among_our_hyperparameters_says_its_limits(method: str) -> None:
     unlimited = [name for name, kind in kinds_of(load_method(method).config_class).items() if kind in (int, float)]
     assert unlimited == []

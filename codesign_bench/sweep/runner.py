@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -158,25 +159,30 @@ def run_sweep(
     threads = max((resolved.config.run.threads for resolved in cells), default=1)
     used_jobs, split = split_cores(available_cores(), len(plan.pending), threads, jobs)
     chosen = make_backend(backend, used_jobs, scheduler)
-    open_folder(out)  # once nothing else can be refused: a refused sweep leaves no folder behind
-    say = printer(console)
-    say(f"{len(cells)} cells, {len(plan.done)} of them already done; results in {out}")
+    say, trouble = printer(console), Trouble(plan.failed | plan.unusable, dict(plan.unreadable))
+    with chosen if plan.pending else nullcontext() as workers:
+        open_folder(out)  # once nothing else can be refused: a refused sweep leaves no folder behind
+        _begin(say, len(cells), plan, out)
+        if workers is not None:
+            say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
+            say(f"cells finish their last episodes: at most {OVERSHOOT:.0%} over the budget, or one smallest batch")
+            imported = os.environ.get(IMPORTS_VARIABLE, "")
+            queue = [Job(resolved.cell, str(out), retry_failed, imported, same_code) for resolved in plan.pending]
+            budgets = {resolved.cell: resolved.config.run.steps for resolved in plan.pending}
+            with ProgressDisplay(console, out, budgets, used_jobs) as display:
+                _run_queue(queue, workers, display, trouble)
+    return _conclude(say, len(cells), trouble, plan)
+
+
+def _begin(say: Log, cells: int, plan: Plan, out: Path) -> None:
+    """Say what there is in the folder, and sweep what killed processes have left there."""
+    say(f"{cells} cells, {len(plan.done)} of them already done; results in {out}")
     for note in plan.notes:
         say(note)
     for cell in plan.done:
         sweep_leftovers(cell.folder(out))
-    trouble = Trouble(plan.failed | plan.unusable, dict(plan.unreadable))
-    if plan.pending:
-        say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
-        if not has_locks(out):
-            say(f"the file system of {out} has no locks: each running cell is guarded by a file, {HOLDER_FILE}")
-        say(f"cells finish their last episodes: at most {OVERSHOOT:.0%} over the budget, or one smallest batch")
-        imported = os.environ.get(IMPORTS_VARIABLE, "")
-        queue = [Job(resolved.cell, str(out), retry_failed, imported, same_code) for resolved in plan.pending]
-        budgets = {resolved.cell: resolved.config.run.steps for resolved in plan.pending}
-        with chosen as workers, ProgressDisplay(console, out, budgets, used_jobs) as display:
-            _run_queue(queue, workers, display, trouble)
-    return _conclude(say, len(cells), trouble, plan)
+    if plan.pending and not has_locks(out):
+        say(f"the file system of {out} has no locks: each running cell is guarded by a file, {HOLDER_FILE}")
 
 
 def _run_queue(queue: list[Job], workers: Backend, display: ProgressDisplay, trouble: Trouble) -> None:

@@ -177,4 +177,5 @@ def test_a_scheduler_that_does_not_answer_gets_one_line(
         sweep(cells()[:1], tmp_path, backend="dask", scheduler="tcp://127.0.0.1:9")
     arguments = ["--method", "toy_search", "--task", "toy_reach", "--import", "toy", "--out", str(tmp_path)]
     assert main(["run", *arguments, "--backend", "dask", "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    assert list(tmp_path.iterdir()) == [], "a refused command leaves nothing behind"
     assert "--scheduler tcp://127.0.0.1:9" in capsys.readouterr().err

@@ -21,7 +21,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 from unittest import mock
 
 from rich.console import Console
@@ -151,20 +151,19 @@ def _path_of(descriptor: Any) -> str:
         return ""
 
 
-def in_child(call: Callable[[], int], log: Path) -> int:
+def in_child(call: Callable[[], int], log: BinaryIO) -> int:
     """Return the exit code of `call` in a forked child, negative for a signal; its output goes to `log`."""
     return os.waitstatus_to_exitcode(os.waitpid(fork(call, log), 0)[1])
 
 
-def fork(call: Callable[[], int], log: Path) -> int:
+def fork(call: Callable[[], int], log: BinaryIO) -> int:
     """Call `call` in a forked child, whose output goes to `log`, and return the child's process id."""
     pid = os.fork()
     if pid == 0:
         code = 70
         try:
-            stream = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
             # Of Python's own streams pytest has made others, which are not the descriptors 1 and 2.
-            sys.stdout = sys.stderr = os.fdopen(stream, "w", buffering=1, encoding="utf-8")
+            sys.stdout = sys.stderr = io.TextIOWrapper(log, encoding="utf-8", write_through=True)
             code = call()
         except BaseException:
             traceback.print_exc()
@@ -199,7 +198,8 @@ def run(out: Path, fault: Fault, cells: tuple[Cell, ...] = CELLS) -> Ended:
                 tally(injection)
             return code
 
-        return in_child(call, folder / workers.LOG_FILE)
+        with workers._open_log(folder) as of_the_cell:
+            return in_child(call, of_the_cell)
 
     def sweep() -> int:
         injection = Injection(out, fault if fault.where == MAIN else Fault(MAIN))
@@ -214,7 +214,8 @@ def run(out: Path, fault: Fault, cells: tuple[Cell, ...] = CELLS) -> Ended:
                 if fault.where == MAIN:
                     tally(injection)
 
-    code = in_child(sweep, log)
+    with open(log, "ab") as stream:
+        code = in_child(sweep, stream)
     return Ended(code, log.read_text(), int(counted.read_text()) if counted.exists() else 0)
 
 
@@ -275,10 +276,13 @@ def start_together(folder: Path, count: int) -> list[Ended]:
             return 2
 
     logs = [folder / f"{number}.log" for number in range(count)]
-    children = [fork(sweep, log) for log in logs]
+    streams = [open(log, "ab") for log in logs]  # noqa: SIM115  # closed below
+    children = [fork(sweep, stream) for stream in streams]
     os.close(writing)
     codes = [os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) for child in children]
     os.close(reading)
+    for stream in streams:
+        stream.close()
     return [Ended(code, log.read_text(), 0) for code, log in zip(codes, logs, strict=True)]
 
 

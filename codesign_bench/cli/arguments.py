@@ -17,6 +17,7 @@ from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError, unknown_name
 from codesign_bench.registry import KINDS, names
 from codesign_bench.study import DEFAULT_STUDY, load_study
+from codesign_bench.visible_text import visible
 
 DEFAULT_RESULTS = Path("results/runs")
 DEFAULT_FIGURES = Path("results/figures")
@@ -162,7 +163,7 @@ def out_file(text: str) -> Path:
     chosen = path(text)
     _check_writable(chosen.parent, text)
     if chosen.is_dir():
-        raise argparse.ArgumentTypeError(f"{printable(text)}: is a folder; give a file in it")
+        raise argparse.ArgumentTypeError(f"{visible(text)}: is a folder; give a file in it")
     return chosen
 
 
@@ -179,7 +180,7 @@ def _check_writable(folder: Path, text: str) -> None:
     except OSError as error:
         fault = error.errno or errno.EACCES
     if fault:
-        raise argparse.ArgumentTypeError(f"{printable(text)}: not writable ({os.strerror(fault)})")
+        raise argparse.ArgumentTypeError(f"{visible(text)}: not writable ({os.strerror(fault)})")
 
 
 def module_name(text: str) -> str:

@@ -10,8 +10,8 @@ from codesign_bench.startup import prepare as _prepare
 _prepare()  # before any other import: it settles where modules come from
 
 # isort: split
-from importlib import import_module  # noqa: E402
-from typing import TYPE_CHECKING, Any  # noqa: E402
+from importlib import import_module  # noqa: E402  # after prepare(), for the reason above
+from typing import TYPE_CHECKING, Any  # noqa: E402  # likewise
 
 if TYPE_CHECKING:
     from codesign_bench.errors import UserError

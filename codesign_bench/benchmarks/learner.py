@@ -25,7 +25,7 @@ from rich.console import Console
 from codesign_bench.benchmarks.workload import Speed, Workload, peak_megabytes, together
 from codesign_bench.code_version import code_version
 from codesign_bench.config.resolve import resolve
-from codesign_bench.console import print_table
+from codesign_bench.console import print_table, printer
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores, computes_in_bfloat16, host_facts, package_versions
 from codesign_bench.method import Problem, load_method, method_names, usable_methods
@@ -156,7 +156,7 @@ def bench_learner(work: Workload, names: Sequence[str], out: Path | None, consol
         cells = f" for each of --cells {work.cells}" if work.cells > 1 else ""
         raise UserError(f"--cores {work.cores}{cells}: there are only {available_cores()}")
     known = contestants()
-    say: Callable[[str], None] = lambda line: console.print(line, markup=False, highlight=False, soft_wrap=True)  # noqa: E731
+    say = printer(console)
     top = ceiling(work)
     found: dict[str, Speed] = {}
     for name in names:

@@ -96,10 +96,10 @@ def _batched(work: Workload) -> Any:
             return [getattr(inner, attr_name, None)] * inner.num_envs
 
         def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-            raise NotImplementedError
+            raise NotImplementedError  # abstract in the base class, and no learner here calls it
 
         def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **keywords: Any) -> list[Any]:
-            raise NotImplementedError
+            raise NotImplementedError  # likewise
 
         def env_is_wrapped(
             self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: Any = None

@@ -144,7 +144,7 @@ def path(text: str) -> Path:
 
 
 def out_folder(text: str) -> Path:
-    """Return the path of a folder that can be written, or made, as far as can be told without doing it.
+    """Return the path of a folder that can be written or made, as far as can be checked without doing it.
 
     Raises:
         ArgumentTypeError: it cannot; nobody should learn that after hours.
@@ -155,7 +155,7 @@ def out_folder(text: str) -> Path:
 
 
 def out_file(text: str) -> Path:
-    """Return the path of a file that can be written, as far as can be told without doing it.
+    """Return the path of a file that can be written, as far as can be checked without doing it.
 
     Raises:
         ArgumentTypeError: it cannot.

@@ -81,7 +81,7 @@ def render_slot(episodes: Episodes, slot: int) -> Frame:
     """
     try:
         return episodes.simulator.render(slot)
-    except NotImplementedError:
+    except NotImplementedError:  # what a simulator without pictures raises
         raise UserError(f"task '{episodes.task.name}' draws no pictures") from None
 
 

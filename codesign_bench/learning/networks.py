@@ -80,7 +80,7 @@ class MLP(nn.Sequential):
         if output_scale != 1.0:
             with torch.no_grad():
                 layers[-1].weight.mul_(output_scale)  # type: ignore[operator]  # The last layer is linear here.
-                layers[-1].bias.zero_()  # type: ignore[operator]
+                layers[-1].bias.zero_()  # type: ignore[operator]  # likewise
 
 
 class IndexMLP(nn.Module):

@@ -32,7 +32,7 @@ SEED = "seed-"
 DAMAGED = "damaged"
 """Not stored: the status of a finished cell with a file that is missing or damaged."""
 OF_A_CELL = (CELL_FILE, CURVE_FILE, METRICS_FILE, EVALUATION_FILE, POLICY_FILE)
-"""Files by which a folder without a cell file is told to be a cell's."""
+"""Files that show that a folder without a cell file was a cell's."""
 CHECKED = (CURVE_FILE, EVALUATION_FILE)
 """Tables that a finished cell has; its record has their checksums."""
 

@@ -174,7 +174,7 @@ class DaskBackend(Backend):
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep Dask's own messages off the screen: what matters is told in one line."""
+    """Keep Dask's own messages off the screen: one line of ours says what matters."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in TALKATIVE]
     loggers = [logging.getLogger(name) for name in names]
     levels = [logger.level for logger in loggers]

@@ -97,7 +97,7 @@ def _sort_into(plan: Plan, resolved: ResolvedCell, record: CellRecord | None, ou
         plan.failed[cell] = record.failure.message
     else:
         try:
-            check_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # a damaged one is told here, not during the sweep
+            check_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # reported before the sweep
         except UserError as error:
             _set_aside(plan, cell, error)
         else:

@@ -1,7 +1,7 @@
 """Cells that were run with other code than would run them now.
 
 The own code of a cell's task and method decides its numbers: a cell that was run with other own code neither counts as
-done nor resumes. Other code of the same packages may decide them, too, so that a difference is told.
+done nor resumes. Other code of the same packages may decide them, too, so that a difference is reported.
 """
 
 from __future__ import annotations

@@ -87,10 +87,10 @@ def test_draws_follow_from_the_seed_and_the_name_of_each_setting() -> None:
 def test_every_draw_of_a_method_is_a_setting_that_it_accepts(name: str) -> None:
     config = resolve(load_method(name), task_names()[0], "laptop").method
     searched = ranges(config)
-    for setting in draw(searched, 50, seed=1):
-        replace(config, **setting)
-    for share in (0.0, NEARLY_ONE):
-        replace(config, **{key: found.at(share) for key, found in searched.items()})
+    ends = [{key: found.at(share) for key, found in searched.items()} for share in (0.0, NEARLY_ONE)]
+    for setting in [*draw(searched, 50, seed=1), *ends]:
+        accepted = replace(config, **setting)
+        assert {key: getattr(accepted, key) for key in setting} == setting
 
 
 @pytest.mark.parametrize("name", method_names())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
@@ -27,6 +28,10 @@ class Settings:
 @pytest.mark.parametrize("rate", [0.0, 1.0, 1, None])
 def test_the_ends_of_a_range_belong_to_it_and_none_is_no_number(rate: Any) -> None:
     check_values(Settings(rate=rate))
+    if rate is not None:
+        beyond = math.nextafter(rate, 2.0 * rate - 0.5)  # away from the middle
+        with pytest.raises(ValueError, match="rate must be a number from 0 to 1 or none"):
+            check_values(Settings(rate=beyond))
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-import pickle
+import pickle  # only `dumps`, which must refuse; nothing is read
 from collections.abc import Callable
 from typing import Any
 

@@ -21,15 +21,16 @@ GIT_SECONDS = 10.0
 
 @dataclass(frozen=True)
 class CodeVersion:
-    """The code that runs."""
+    """The code of a package; fingerprints of ours cover its Python files, those of others all of their files."""
 
-    version: str
+    version: str | None
+    """None: it is not installed."""
     commit: str | None
     """None: the code does not lie in a git checkout of itself, or git cannot be asked."""
     changed: bool | None
-    """Whether a Python file of the code differs from the commit; None without a commit."""
+    """Whether a file of the code differs from the commit; None without a commit."""
     fingerprint: str
-    """SHA-256 over the names and contents of all Python files; an installed copy has the same as its checkout."""
+    """SHA-256 over names and contents of files; an installed copy has the same as its checkout."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the entries as JSON values."""

@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, packages_distributions, version
 from pathlib import Path
-from typing import Any
 
-from codesign_bench.code_version import checked_out, code_version
+from codesign_bench.code_version import CodeVersion, checked_out, code_version
 from codesign_bench.source_code import CORE, SourceModule
 
 RESULTS_MARKER = "codesign-bench.json"
@@ -23,37 +21,18 @@ MOST_BYTES = 64 * 2**20
 """Of a larger file, only its size counts."""
 
 
-@dataclass(frozen=True)
-class PackageCode:
-    """The code of a package."""
-
-    version: str | None
-    """None: it is not installed."""
-    commit: str | None
-    """None: it does not lie in a git checkout of itself."""
-    changed: bool | None
-    """Whether a file differs from the commit; None without a commit."""
-    fingerprint: str
-    """SHA-256 over names and contents of its files."""
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the entries as JSON values."""
-        return asdict(self)
-
-
 @lru_cache
-def package_code(package: str) -> PackageCode:
+def package_code(package: str) -> CodeVersion:
     """Return the code of a package, given the name that `package_of` returned."""
     if package == CORE:
-        own = code_version()
-        return PackageCode(own.version, own.commit, own.changed, own.fingerprint)
+        return code_version()
     root = SourceModule(package)
     folders = [Path(place) for place in (root.spec and root.spec.submodule_search_locations) or ()]
     files = {f"{path.relative_to(folder).as_posix()}": path for folder in folders for path in _files(folder)}
     if not folders and root.file is not None:
         files = {root.file.name: root.file}
     commit, changed = (None, None) if root.file is None else checked_out(root.file, folders or [root.file])
-    return PackageCode(_version(package), commit, changed, _fingerprint(files))
+    return CodeVersion(_version(package), commit, changed, _fingerprint(files))
 
 
 def _version(package: str) -> str | None:

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from builders import write_files
-from codesign_bench.code_version import code_version
-from codesign_bench.package_code import PackageCode, package_code
+from codesign_bench.code_version import CodeVersion, code_version
+from codesign_bench.package_code import package_code
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def sticks(modules: Path) -> Path:
     return modules / "sticks"
 
 
-def package(name: str = "sticks") -> PackageCode:
+def package(name: str = "sticks") -> CodeVersion:
     """Return the code of a package as it is on disk."""
     package_code.cache_clear()
     return package_code(name)

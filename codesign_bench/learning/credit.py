@@ -28,7 +28,7 @@ from codesign_bench.learning.trajectories import Trajectories
 from codesign_bench.learning.update_loop import UpdateLoop
 from codesign_bench.learning.value_networks import DesignValue
 from codesign_bench.seeding import Streams
-from codesign_bench.task import Slots, Task
+from codesign_bench.task import Booleans, Slots, Task
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,24 @@ class Steps:
     """(n, C)"""
     log_prob: Tensor
     """(n,) log-probabilities of the actions under the policy that took them."""
+    designing: Booleans
+    """(n,) `is_design` in main memory, where rows are chosen: asking the device would wait for all that it does."""
 
     @classmethod
     def of(cls, batch: Trajectories, compute: Compute) -> Steps:
         """Return all valid steps of `batch`."""
-        arrays = (batch.observation, batch.is_design, batch.design, batch.control, batch.extras[LOG_PROB])
-        return cls(*(compute.tensor(array[batch.valid]) for array in arrays))
+
+        def of_valid(array: np.ndarray) -> Tensor:
+            return compute.tensor(array[batch.valid])
+
+        return cls(
+            observation=of_valid(batch.observation),
+            is_design=of_valid(batch.is_design),
+            design=of_valid(batch.design),
+            control=of_valid(batch.control),
+            log_prob=of_valid(batch.extras[LOG_PROB]),
+            designing=batch.is_design[batch.valid],
+        )
 
 
 class DesignCredit(ABC):
@@ -67,9 +79,9 @@ class DesignCredit(ABC):
         """Return the parameters that the batch's policy update trains: by default the controller's."""
         return self.actor.control_parameters()
 
-    def learned(self, is_design: Tensor) -> Tensor:
+    def learned(self, designing: Booleans) -> Booleans:
         """Return which steps (n,) the batch's policy update learns from: by default the control steps."""
-        return ~is_design
+        return ~designing
 
     def log_probs(self, steps: Steps) -> LogProbs:
         """Return the function that maps rows of `steps` to log-probabilities and mean entropy."""
@@ -103,31 +115,30 @@ class JointCredit(DesignCredit):
         known = {id(p) for p in control}
         return control + [p for p in self.actor.design_parameters() if id(p) not in known]
 
-    def learned(self, is_design: Tensor) -> Tensor:
+    def learned(self, designing: Booleans) -> Booleans:
         """Return all steps (n,)."""
-        return torch.ones_like(is_design)
+        return np.ones_like(designing)
 
     def log_probs(self, steps: Steps) -> LogProbs:
         """Return the function that maps rows of `steps` to log-probabilities and mean entropy over both phases."""
 
         def of_both(rows: Slots) -> tuple[Tensor, Tensor]:
-            index = self.compute.tensor(rows)
-            designing = steps.is_design[index]
+            designing = steps.designing[rows]
             log_prob, entropy = steps.observation.new_zeros(len(rows)), steps.observation.new_zeros(())
             # Each network is evaluated only on the rows of its phase, which is less work than both networks on all rows
-            # and a selection afterwards. masked_scatter restores the order of the rows; gradients pass through it.
+            # and a selection afterwards. index_copy restores the order of the rows; gradients pass through it.
             for phase, action, where in (
                 (self.actor.control, steps.control, ~designing),
                 (self.actor.design, steps.design, designing),
             ):
                 if where.any():  # a small minibatch may contain no design step
-                    chosen = index[where]
+                    chosen = self.compute.tensor(rows[where])
                     observation = self.compute.whole_blocks(steps.observation[chosen])
                     mean, log_std = self.compute.distribution(phase, observation)
                     part, part_entropy = gaussian(mean[: len(chosen)], log_std, action[chosen])
-                    log_prob = log_prob.masked_scatter(where, part)
+                    log_prob = log_prob.index_copy(0, self.compute.tensor(np.flatnonzero(where)), part)
                     # Weighted by the phase's share of rows: the mean entropy of the actions taken.
-                    entropy = entropy + where.float().mean() * part_entropy
+                    entropy = entropy + float(where.mean()) * part_entropy
             return log_prob, entropy
 
         return of_both

@@ -124,8 +124,8 @@ class TwoPhaseLearner:
 
     def _update_policy_and_value(self, steps: Steps, estimates: Estimates) -> dict[str, float]:
         config, optimizers = self.config, self.optimizers
-        learned = self.credit.learned(steps.is_design)
-        rows = torch.nonzero(learned)[:, 0].cpu().numpy()
+        rows = np.flatnonzero(self.credit.learned(steps.designing))
+        learned = self.compute.tensor(rows)
         # Normalised over the steps that this update learns from. Design steps, few and with a different spread, must
         # not shift the scale when they have their own update.
         advantage = torch.zeros_like(estimates.advantage)
@@ -137,7 +137,7 @@ class TwoPhaseLearner:
         value = ValueUpdate(
             self._predict, optimizers["value"], steps.observation, estimates.target, config.max_gradient_norm
         )
-        first = steps.is_design.cpu().numpy()[rows] if config.batch_design else None
+        first = steps.designing[rows] if config.batch_design else None
         self.loop.run((policy, value), rows, config.epochs, config.minibatch_size, self.streams["minibatches"], first)
         return {"value_loss": value.loss, "kl": policy.divergence, "policy_steps": float(policy.steps)}
 

@@ -56,12 +56,14 @@ def visiting(learner: TwoPhaseLearner) -> Iterator[None]:
         raise failure
 
 
-@pytest.fixture
-def elsewhere(make_learner: MakeLearner, monkeypatch: pytest.MonkeyPatch) -> TwoPhaseLearner:
+@pytest.fixture(params=["joint", "separate"])
+def elsewhere(
+    request: pytest.FixtureRequest, make_learner: MakeLearner, monkeypatch: pytest.MonkeyPatch
+) -> TwoPhaseLearner:
     """A learner after its first batch, whose updates are to run on the device without numbers."""
     # Torch knows no reduced precision for this device, and refuses even to switch it off.
     monkeypatch.setattr(torch, "autocast", lambda *_, **__: nullcontext())
-    learner = make_learner(batch_size=600)
+    learner = make_learner(batch_size=600, design_credit=request.param)
     learner.train(600)
     learner.use_device("meta")
     return learner

@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from codesign_bench.learning.actor import Distribution
 from codesign_bench.learning.checkpointing import Modules, Optimizers
 from codesign_bench.learning.ppo_config import Precision
+from codesign_bench.learning.residence import Residence
 
 CPU = torch.device("cpu")
 BLOCK = 64
@@ -29,7 +30,11 @@ class Compute:
 
     def __init__(self, precision: Precision = "fp32", block: int = BLOCK) -> None:
         self.precision, self.block = precision, block
-        self.device = CPU
+        self.use_device(CPU)
+
+    def use_device(self, device: torch.device) -> None:
+        """Compute updates on a device."""
+        self.device, self._residence = device, Residence(device)
 
     @property
     def reduced(self) -> bool:
@@ -42,11 +47,11 @@ class Compute:
         if self.device == CPU:
             yield
             return
-        move(modules, optimizers, self.device)
+        self._residence.enter(modules, optimizers)
         try:
             yield
         finally:
-            move(modules, optimizers, CPU)
+            self._residence.leave(modules, optimizers)
 
     def tensor(self, array: np.ndarray) -> Tensor:
         """Return an array as a tensor on the device."""
@@ -77,12 +82,3 @@ class Compute:
 
     def _autocast(self) -> torch.autocast:
         return torch.autocast(self.device.type, torch.bfloat16, enabled=self.reduced)
-
-
-def move(modules: Modules, optimizers: Optimizers, device: torch.device) -> None:
-    """Move networks, and the moments and counts of their optimizers, to a device."""
-    for module in modules.values():
-        module.to(device)
-    for optimizer in optimizers.values():
-        for values in optimizer.state.values():
-            values.update({key: value.to(device) for key, value in values.items()})

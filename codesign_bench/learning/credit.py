@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from codesign_bench.learning.actor import LOG_PROB, Actor
+from codesign_bench.learning.actor import LOG_PROB, Actor, Distribution
 from codesign_bench.learning.compute import Compute
 from codesign_bench.learning.gae import episode_returns
 from codesign_bench.learning.optimizers import adam
@@ -83,6 +83,10 @@ class DesignCredit(ABC):
         """Return which steps (n,) the batch's policy update learns from: by default the control steps."""
         return ~designing
 
+    def phases(self, steps: Steps) -> list[tuple[Distribution, Tensor]]:
+        """Return what that update trains, the controller first, each with its actions (n, A) in `steps`."""
+        return [(self.actor.control, steps.control)]
+
     def log_probs(self, steps: Steps) -> LogProbs:
         """Return the function that maps rows of `steps` to log-probabilities and mean entropy."""
 
@@ -119,6 +123,10 @@ class JointCredit(DesignCredit):
         """Return all steps (n,)."""
         return np.ones_like(designing)
 
+    def phases(self, steps: Steps) -> list[tuple[Distribution, Tensor]]:
+        """Return controller and designer with their actions (n, A)."""
+        return [*super().phases(steps), (self.actor.design, steps.design)]
+
     def log_probs(self, steps: Steps) -> LogProbs:
         """Return the function that maps rows of `steps` to log-probabilities and mean entropy over both phases."""
 
@@ -127,10 +135,7 @@ class JointCredit(DesignCredit):
             log_prob, entropy = steps.observation.new_zeros(len(rows)), steps.observation.new_zeros(())
             # Each network is evaluated only on the rows of its phase, which is less work than both networks on all rows
             # and a selection afterwards. index_copy restores the order of the rows; gradients pass through it.
-            for phase, action, where in (
-                (self.actor.control, steps.control, ~designing),
-                (self.actor.design, steps.design, designing),
-            ):
+            for (phase, action), where in zip(self.phases(steps), (~designing, designing), strict=True):
                 if where.any():  # a small minibatch may contain no design step
                     chosen = self.compute.tensor(rows[where])
                     observation = self.compute.whole_blocks(steps.observation[chosen])

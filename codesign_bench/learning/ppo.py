@@ -19,6 +19,8 @@ from codesign_bench.task import Booleans, Slots
 
 LogProbs = Callable[[Slots], tuple[Tensor, Tensor]]
 """Maps row indices (m,) to the log-probabilities (m,) of their actions and the mean entropy ()."""
+Mean = Callable[[Tensor], Tensor]
+"""Maps values (m,) of a minibatch's rows to their mean ()."""
 
 
 @dataclass(frozen=True)
@@ -37,17 +39,17 @@ class PolicyLoss:
         return cls(config.clip_ratio, config.entropy_weight, kl_threshold, config.max_gradient_norm)
 
     def __call__(
-        self, log_prob: Tensor, old_log_prob: Tensor, advantage: Tensor, entropy: Tensor
-    ) -> tuple[Tensor, float]:
-        """Return loss () and the estimated KL divergence (Schulman's k3 estimator) for (m,) inputs."""
+        self, log_prob: Tensor, old_log_prob: Tensor, advantage: Tensor, entropy: Tensor, mean: Mean = torch.mean
+    ) -> tuple[Tensor, Tensor]:
+        """Return loss () and the estimated KL divergence () (Schulman's k3 estimator) for (m,) inputs."""
         log_ratio = log_prob - old_log_prob
         ratio = log_ratio.exp()
         # The minimum removes any gain beyond the clipping range but keeps the loss there: a step that went too far in
         # the wrong direction is still corrected.
         clipped = ratio.clamp(1.0 - self.clip_ratio, 1.0 + self.clip_ratio)
-        surrogate = torch.minimum(ratio * advantage, clipped * advantage).mean()
+        surrogate = mean(torch.minimum(ratio * advantage, clipped * advantage))
         with torch.no_grad():  # unbiased like -log_ratio, but never negative: less variance on few rows
-            divergence = float((ratio - 1.0 - log_ratio).mean())
+            divergence = mean(ratio - 1.0 - log_ratio)
         return -surrogate - self.entropy_weight * entropy, divergence
 
 
@@ -71,7 +73,7 @@ class PolicyUpdate:
     ) -> None:
         self.loss, self.log_probs, self.optimizer = loss, log_probs, optimizer
         self.old_log_prob, self.advantage = old_log_prob, advantage
-        self.parameters = [p for group in optimizer.param_groups for p in group["params"]]
+        self.parameters = trained(optimizer)
         self.stopped = False
         self.steps = 0
         self.divergence = 0.0
@@ -82,7 +84,8 @@ class PolicyUpdate:
             return
         index = torch.from_numpy(rows).to(self.advantage.device)
         log_prob, entropy = self.log_probs(rows)
-        loss, self.divergence = self.loss(log_prob, self.old_log_prob[index], self.advantage[index], entropy)
+        loss, divergence = self.loss(log_prob, self.old_log_prob[index], self.advantage[index], entropy)
+        self.divergence = float(divergence)
         # Checked before the step, so that a step that would go further is not taken. Advantages were estimated for the
         # policy that collected the batch and are unreliable this far from it, so the rest of the batch is not used.
         if self.divergence > self.loss.kl_threshold:
@@ -104,7 +107,7 @@ class ValueUpdate:
         max_norm: float,
     ) -> None:
         self.predict, self.optimizer, self.observation, self.target = predict, optimizer, observation, target
-        self.parameters = [p for group in optimizer.param_groups for p in group["params"]]
+        self.parameters = trained(optimizer)
         self.max_norm = max_norm
         self.loss = 0.0
 
@@ -114,6 +117,11 @@ class ValueUpdate:
         loss = nn.functional.mse_loss(self.predict(self.observation[index]), self.target[index])
         gradient_step(loss, self.optimizer, self.parameters, self.max_norm)
         self.loss = float(loss.detach())
+
+
+def trained(optimizer: torch.optim.Optimizer) -> list[nn.Parameter]:
+    """Return the parameters that an optimizer trains."""
+    return [parameter for group in optimizer.param_groups for parameter in group["params"]]
 
 
 def gradient_step(

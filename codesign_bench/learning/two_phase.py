@@ -21,11 +21,12 @@ from codesign_bench.learning.compute import Compute
 from codesign_bench.learning.credit import DesignCredit, JointCredit, NoCredit, SeparateCredit, Steps
 from codesign_bench.learning.critic import Critic, Estimates
 from codesign_bench.learning.explorer import Explorer, FixedDesigns, Trial
+from codesign_bench.learning.fixed_updates import Batch, FixedPolicyUpdate, FixedUpdates, FixedValueUpdate
 from codesign_bench.learning.optimizers import Annealing, adam
 from codesign_bench.learning.ppo import LogProbs, PolicyLoss, PolicyUpdate, ValueUpdate, normalized
 from codesign_bench.learning.ppo_config import PPOConfig
 from codesign_bench.learning.trajectories import Trajectories
-from codesign_bench.learning.update_loop import UpdateLoop
+from codesign_bench.learning.update_loop import UpdateLoop, drawn
 from codesign_bench.learning.value_networks import ValueNetwork
 from codesign_bench.method import BatchReport, Policy, Problem, State
 from codesign_bench.seeding import Streams
@@ -61,6 +62,7 @@ class TwoPhaseLearner:
             **self.credit.optimizers,
         }
         self.annealing = Annealing(self.optimizers, config.final_learning_rate_fraction)
+        self.fixed: FixedUpdates | None = None
         self.env_steps = 0
 
     def _make_credit(self) -> DesignCredit:
@@ -78,7 +80,17 @@ class TwoPhaseLearner:
 
     def use_device(self, name: str) -> None:
         """Update the networks on torch's device `name`; rollouts stay on the CPU."""
-        self.compute.device = torch.device(name)
+        self.compute.use_device(torch.device(name))
+        self.fixed = self._make_fixed() if self.compute.device.type == "cuda" else None
+
+    def _make_fixed(self) -> FixedUpdates:
+        """Return updates that a GPU can replay."""
+        config, optimizers = self.config, self.optimizers
+        loss = PolicyLoss.of(config, config.kl_threshold)
+        return FixedUpdates(
+            FixedPolicyUpdate(self.credit, optimizers["policy"], loss, self.compute),
+            FixedValueUpdate(self.value, optimizers["value"], config.max_gradient_norm, self.compute),
+        )
 
     def policy(self) -> Policy:
         """Return the actor acting with its means."""
@@ -132,13 +144,16 @@ class TwoPhaseLearner:
         advantage[learned] = normalized(estimates.advantage[learned])
         log_probs = self.credit.log_probs(steps)
         old_log_prob = self._old_log_prob(steps, log_probs, rows)
+        first = steps.designing[rows] if config.batch_design else None
+        drawing = (rows, config.epochs, config.minibatch_size, self.streams["minibatches"], first)
+        if self.fixed is not None:
+            return self.fixed.run(Batch(steps, old_log_prob, advantage, estimates.target), drawn(*drawing))
         loss = PolicyLoss.of(config, config.kl_threshold)
         policy = PolicyUpdate(loss, log_probs, optimizers["policy"], old_log_prob, advantage)
         value = ValueUpdate(
             self._predict, optimizers["value"], steps.observation, estimates.target, config.max_gradient_norm
         )
-        first = steps.designing[rows] if config.batch_design else None
-        self.loop.run((policy, value), rows, config.epochs, config.minibatch_size, self.streams["minibatches"], first)
+        self.loop.run((policy, value), *drawing)
         return {"value_loss": value.loss, "kl": policy.divergence, "policy_steps": float(policy.steps)}
 
     def _old_log_prob(self, steps: Steps, log_probs: LogProbs, rows: Slots) -> Tensor:

@@ -42,7 +42,7 @@ class UpdateLoop:
         """
         # All minibatches are drawn before any update runs: the order of threads, or a policy that stops early, then has
         # no effect on the random numbers of the other updates and of later batches.
-        parts = [rows[part] for _ in range(epochs) for part in minibatches(len(rows), minibatch_size, rng, first)]
+        parts = [part for epoch in drawn(rows, epochs, minibatch_size, rng, first) for part in epoch]
 
         def learn(update: Update) -> None:
             for part in parts:
@@ -57,3 +57,10 @@ class UpdateLoop:
     def step(self, update: Update, rows: Slots) -> None:
         """Take one gradient step of `update` on `rows` (m,); a subclass may observe it."""
         update.step(rows)
+
+
+def drawn(
+    rows: Slots, epochs: int, minibatch_size: int, rng: np.random.Generator, first: Booleans | None = None
+) -> list[list[Slots]]:
+    """Return the minibatches of `rows` (n,) of every epoch; the rows that `first` (n,) marks come first."""
+    return [[rows[part] for part in minibatches(len(rows), minibatch_size, rng, first)] for _ in range(epochs)]

@@ -98,7 +98,7 @@ def test_mixing_devices_would_raise(elsewhere: TwoPhaseLearner) -> None:
 
 def test_networks_come_back_after_an_error() -> None:
     compute, network = Compute(), torch.nn.Linear(2, 2)
-    compute.device = torch.device("meta")
+    compute.use_device(torch.device("meta"))
     with pytest.raises(NotImplementedError, match=BACK_FROM_META), compute.holding({"network": network}, {}):
         raise KeyboardInterrupt
 

@@ -23,9 +23,11 @@ EXAMPLE = TESTS / "third_party"
 MEMBERS = ("reach", "random_search", "sac", "tool_lengths", "fitting_lengths")
 LISTINGS = (
     *(f"cli/test_{command}.py" for command in ("list", "show", "status", "program")),
-    *("docs/test_pages.py", "test_architecture.py", "study", "claims/test_verify.py"),
+    *("docs/test_pages.py", "test_architecture.py"),
 )
-"""Tests of what shows or compares all members."""
+"""Tests of what shows all members."""
+COMPARISONS = ("study", "claims/test_verify.py")
+"""Tests of what compares all members."""
 IMPORTS = tuple(f"--import=reach_example.{name}" for name in ("reach", "random_search", "sac"))
 SMALL_SAC = ("batch_size=250", "minibatch_size=32", "updates_per_step=0.05", "replay_size=2000")
 """Batches are short, and the replay buffer overflows."""
@@ -205,8 +207,11 @@ def test_its_members_keep_every_promise_that_is_tested_of_members(installed: Pat
         assert any(f"[{member}" in name or f"-{member}" in name for name in passed), f"nothing was asked of {member}"
 
 
-def test_everything_that_lists_members_holds_with_it(installed: Path) -> None:
-    suite("-q", *(str(TESTS / name) for name in LISTINGS), path=installed)
+@pytest.mark.parametrize(
+    "names", [LISTINGS, pytest.param(COMPARISONS, marks=pytest.mark.slow)], ids=["lists", "compares"]
+)
+def test_everything_that_lists_or_compares_members_holds_with_it(names: tuple[str, ...], installed: Path) -> None:
+    suite("-q", *(str(TESTS / name) for name in names), path=installed)
 
 
 def test_changed_code_of_a_package_is_told_and_changed_own_code_of_a_member_refused(tmp_path: Path) -> None:

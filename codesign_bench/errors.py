@@ -23,9 +23,13 @@ class ChangedTaskError(UserError):
     """The task has changed since a stored state was trained, so the state can neither be resumed nor act."""
 
 
-def unknown_name(kind: str, name: str, choices: Iterable[str]) -> UserError:
+class UnknownNameError(UserError):
+    """No member has this name."""
+
+
+def unknown_name(kind: str, name: str, choices: Iterable[str]) -> UnknownNameError:
     """Return the error for a name that is not among `choices`; its message lists them."""
-    return UserError(f"unknown {kind} '{name}'; choose from: {', '.join(choices)}")
+    return UnknownNameError(f"unknown {kind} '{name}'; choose from: {', '.join(choices)}")
 
 
 def in_one_line(error: BaseException) -> str:

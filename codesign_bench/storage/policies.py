@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from codesign_bench.config.resolve import method_config
-from codesign_bench.errors import ChangedTaskError, UnavailableError, UserError
-from codesign_bench.method import Array, Policy, load_method
+from codesign_bench.errors import ChangedTaskError, UnavailableError, UnknownNameError, UserError
+from codesign_bench.method import Array, Method, Policy, load_method
 from codesign_bench.storage.arrays import load_arrays, save_arrays
 from codesign_bench.storage.cells import StoredCell, open_cell
 from codesign_bench.storage.files import reason_of
@@ -45,12 +45,12 @@ def policy_of(cell: StoredCell) -> Policy:
         ChangedTaskError: its task has changed since: its version, or the size of its observation.
         UserError: it is not finished, or its files are damaged or incompatible with this version.
     """
+    task, method_class = members_of(cell)
     tensors, record, path = policy_tensors(cell), cell.record, cell.folder / POLICY_FILE
-    method_class = load_method(record.method)
     _check_widths(cell)
     config = method_config(method_class.config_class, record.config.method)
     try:
-        return method_class.make_policy(load_task(record.task), config, tensors)
+        return method_class.make_policy(task, config, tensors)
     except ChangedTaskError as error:
         again = f"codesign-bench run --task {record.task} --method {record.method}"
         raise ChangedTaskError(f"{path} was {error}; train it again, into another folder: {again}") from error
@@ -67,7 +67,7 @@ def misfit(cell: StoredCell) -> str:
     """
     try:
         policy_of(cell)
-    except (ChangedTaskError, UnavailableError) as error:
+    except (ChangedTaskError, UnavailableError, UnknownNameError) as error:
         return str(error)
     return ""
 
@@ -82,7 +82,20 @@ def policy_and_task(folder: Path, name: str | None) -> tuple[Policy, Task]:
     trained_on = cell.record.task
     if name not in (None, trained_on):
         raise UserError(f"--policy {folder}: trained on '{trained_on}', not on '{name}'")
-    return policy_of(cell), load_task(trained_on)
+    return policy_of(cell), members_of(cell)[0]
+
+
+def members_of(cell: StoredCell) -> tuple[Task, type[Method[Any]]]:
+    """Return task and method of a cell.
+
+    Raises:
+        UnavailableError: one of them cannot be used in this Python.
+        UnknownNameError: no task or method has the stored name; the message names the cell's file.
+    """
+    try:
+        return load_task(cell.record.task), load_method(cell.record.method)
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{cell.folder / CELL_FILE}: {error}") from error
 
 
 def _check_widths(cell: StoredCell) -> None:
@@ -105,7 +118,7 @@ def policy_tensors(cell: StoredCell) -> dict[str, Array]:
         ChangedTaskError: the task has another version now.
         UserError: the cell is not finished, or the file is damaged.
     """
-    record, now = cell.record, load_task(cell.record.task).version
+    record, now = cell.record, members_of(cell)[0].version
     if record.task_version != now:
         raise ChangedTaskError(
             f"'{cell.folder}' was trained on version {record.task_version} of task '{record.task}', which is now at "

@@ -26,6 +26,14 @@ def test_a_cell_without_a_policy_says_so(tmp_path: Path, status: str, named: str
         policy_and_task(tmp_path, None)
 
 
+@pytest.mark.parametrize(("kind", "name"), [("task", "pull"), ("method", "guess")])
+def test_a_cell_of_a_task_or_method_that_is_not_here_is_named(tmp_path: Path, kind: str, name: str) -> None:
+    folder = store_cell(tmp_path, **{kind: name})
+    with pytest.raises(UserError, match=rf"^{folder}/cell\.json: unknown {kind} '{name}'; choose from: "):
+        load_policy(folder)
+    assert misfit(open_cell(folder)).startswith(f"{folder}/cell.json: unknown {kind}")
+
+
 @pytest.mark.usefixtures("toy")
 def test_the_policy_on_disk_is_the_one_that_was_judged(tmp_path: Path) -> None:
     (cell,) = toy_cells()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import socket
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -78,6 +79,29 @@ def host_facts(threads: int) -> dict[str, Any]:
 def computes_in_bfloat16() -> bool:
     """Return whether this processor has bfloat16 matrix products; without them, bfloat16 is slower than fp32."""
     return not _flags().isdisjoint(BFLOAT16_FLAGS)
+
+
+def total_megabytes() -> float | None:
+    """Return the memory of this machine in MB, or None where the system does not tell."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2**20
+    except (AttributeError, OSError, ValueError):
+        return None
+
+
+def peak_megabytes() -> float:
+    """Return the peak memory of this process plus that of the largest of its ended children.
+
+    The maximum in `getrusage` survives `exec`, so it may be that of the parent process. On systems with /proc, the
+    maximum of only this program is used.
+    """
+    import resource  # there is none on Windows
+
+    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    status = Path("/proc/self/status")
+    if status.exists():
+        own = int(re.search(r"^VmHWM:\s+(\d+) kB", status.read_text(), re.MULTILINE)[1])  # type: ignore[index]  # Linux always has this line.
+    return (own + resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) / 1024.0
 
 
 def _flags() -> set[str]:

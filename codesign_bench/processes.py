@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import os
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from codesign_bench.startup import SAFE_PATH_VARIABLE
 
@@ -18,6 +22,11 @@ THREAD_VARIABLES = (
     "VECLIB_MAXIMUM_THREADS",
 )
 """Environment variables that the numerical libraries read when they are first imported."""
+START = (
+    "import sys; sys.path[:] = filter(None, sys.path); import importlib, json; "
+    "sys.path[:] = json.loads(sys.argv.pop(1)); importlib.import_module(sys.argv.pop(1)).start()"
+)
+"""Starts a module of ours with this process's module path; nothing is imported from the working folder."""
 WATCH_SECONDS = 0.3
 EXIT_ORPHANED = 76
 """Exit code of a process whose parent has ended."""
@@ -65,3 +74,26 @@ def end_with(parent_pid: int) -> None:
         os._exit(EXIT_ORPHANED)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+def python_process(module: str, *arguments: str, **options: Any) -> subprocess.Popen[Any]:
+    """Start `start()` of a module of this package in a new process, with `arguments` in `sys.argv`.
+
+    Its standard input is a pipe that is never written to, and that closes when this process ends: see
+    `watched_by_parent`. Its output is a pipe, too, of text, unless `options` of `subprocess.Popen` say where it goes.
+    """
+    path = [entry for entry in sys.path if entry]  # an empty entry is the working folder
+    given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": thread_environment(), **options}
+    command = [sys.executable, "-c", START, json.dumps(path), module, *arguments]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, cwd=existing_folder(), **given)
+
+
+def watched_by_parent() -> None:
+    """End this process at once when its standard input closes; the system closes it when the parent dies."""
+
+    def wait() -> None:
+        while os.read(0, 4096):
+            pass
+        os._exit(EXIT_ORPHANED)
+
+    threading.Thread(target=wait, daemon=True).start()

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +14,7 @@ from codesign_bench.processes import (
     EXIT_ORPHANED,
     THREAD_VARIABLES,
     children_with_safe_modules,
+    python_process,
     thread_environment,
 )
 from codesign_bench.startup import SAFE_PATH_VARIABLE
@@ -78,3 +80,23 @@ def test_the_module_path_of_children_is_safe_only_meanwhile(
     with children_with_safe_modules():
         assert os.environ[SAFE_PATH_VARIABLE] == "1"
     assert os.environ.get(SAFE_PATH_VARIABLE) == before
+
+
+def test_a_process_runs_a_modules_start_and_ends_when_its_parent_lets_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "patient.py").write_text(
+        "import sys, time\n"
+        "from codesign_bench.processes import watched_by_parent\n"
+        "def start():\n"
+        "    watched_by_parent()\n"
+        "    print(sys.argv[1], flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    process = python_process("patient", "an argument")
+    assert process.stdout.readline() == "an argument\n"
+    process.stdin.close()
+    assert process.wait(timeout=30) == EXIT_ORPHANED
+    process.stdout.close()
+    process.stderr.close()

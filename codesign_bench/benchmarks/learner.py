@@ -22,12 +22,18 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from codesign_bench.benchmarks.workload import Speed, Workload, peak_megabytes, together
+from codesign_bench.benchmarks.workload import Speed, Workload, together
 from codesign_bench.code_version import code_version
 from codesign_bench.config.resolve import resolve
 from codesign_bench.console import print_table, printer
 from codesign_bench.errors import UserError
-from codesign_bench.machine import available_cores, computes_in_bfloat16, host_facts, package_versions
+from codesign_bench.machine import (
+    available_cores,
+    computes_in_bfloat16,
+    host_facts,
+    package_versions,
+    peak_megabytes,
+)
 from codesign_bench.method import Problem, load_method, method_names, usable_methods
 from codesign_bench.processes import thread_environment
 from codesign_bench.seeding import Streams

@@ -12,7 +12,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from codesign_bench.benchmarks.workload import Speed, Workload, configured, peak_megabytes
+from codesign_bench.benchmarks.workload import Speed, Workload, configured
+from codesign_bench.machine import peak_megabytes
 from codesign_bench.task import Task, load_task
 from codesign_bench.task.envs import ToolVectorEnv, environment_id, register_environments
 from codesign_bench.task.episodes import Episodes

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import re
-import resource
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from codesign_bench.config.resolve import resolve
@@ -67,19 +64,6 @@ def configured(setting: str, work: Workload) -> Any:
         if hasattr(config, setting):
             return getattr(config, setting)
     raise LookupError(f"no method has a setting '{setting}'")
-
-
-def peak_megabytes() -> float:
-    """Return the peak memory of this process plus that of the largest of its ended children.
-
-    The maximum in `getrusage` survives `exec`, so it may be that of the parent process. On systems with /proc, the
-    maximum of only this program is used.
-    """
-    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    status = Path("/proc/self/status")
-    if status.exists():
-        own = int(re.search(r"^VmHWM:\s+(\d+) kB", status.read_text(), re.MULTILINE)[1])  # type: ignore[index]  # Linux always has this line.
-    return (own + resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) / 1024.0
 
 
 def together(speeds: Sequence[Speed]) -> Speed:

@@ -70,6 +70,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_out(parser, DEFAULT_RESULTS)
     add_sweep(parser)
     add_same_code(parser)
+    parser.add_argument(
+        "--dry-run",
+        action="store_true",
+        help="run nothing: list what would run, be resumed or skipped, with the expected time and memory",
+    )
 
 
 # Modules that import pandas or torch are imported inside functions, so that `list` and `--help` need neither.
@@ -79,7 +84,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Run the grid; return 0 if all of its cells are done, 1 if some failed."""
     from codesign_bench.cell.cell import resolve_cells
     from codesign_bench.cell.grid import grid, parse_seeds, variants_of
-    from codesign_bench.sweep.runner import run_sweep
+    from codesign_bench.sweep.runner import dry_run, run_sweep
 
     check_once(options.overrides, steps=options.steps, device=options.device, precision=options.precision)
     log = printer(console)
@@ -95,6 +100,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
     resolved = resolve_cells(list(cells) if options.tuned is None else tuned_cells(cells, options.tuned))
     for device in {cell.config.run.device for cell in resolved}:
         _check_device(device)
+    if options.dry_run:
+        return dry_run(
+            resolved,
+            options.out,
+            console=console,
+            jobs=options.jobs,
+            retry_failed=options.retry_failed,
+            same_code=options.same_code,
+        )
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does
     return run_sweep(
         resolved,

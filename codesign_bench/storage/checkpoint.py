@@ -96,13 +96,16 @@ def load_checkpoint(path: Path) -> Checkpoint | None:
     return _usable(path, _load_checkpoint)
 
 
-def check_checkpoint(path: Path) -> None:
-    """Check header and checksums of the checkpoint in `path`, if there is one, without loading it whole.
+def check_checkpoint(path: Path) -> int:
+    """Check header and checksums of the checkpoint in `path` without loading it whole.
+
+    Returns:
+        Its environment steps; 0 if there is no checkpoint.
 
     Raises:
         UserError: it is truncated or damaged.
     """
-    _usable(path, _check_checkpoint)
+    return _usable(path, _check_checkpoint) or 0
 
 
 def remove_checkpoint(path: Path) -> None:
@@ -118,11 +121,12 @@ def _load_checkpoint(path: Path) -> Checkpoint:
     return Checkpoint(State(arrays, header["values"], large), header["streams"], Progress(**header["progress"]))
 
 
-def _check_checkpoint(path: Path) -> None:
+def _check_checkpoint(path: Path) -> int:
     with open_stream(path, ARRAYS_BYTES) as stream:
         header = checked_header(stream)
-    Progress(**header["progress"])
+    progress = Progress(**header["progress"])
     _read_large(path, header, _check_member)
+    return progress.env_steps
 
 
 def _usable(path: Path, read: Callable[[Path], Any]) -> Any:

@@ -51,13 +51,23 @@ def open_folder(out: Path) -> None:
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
-        ours = is_marked(out) or any(out.glob(CELL_PATTERN))
-        # Another process may mark the folder after the first look and fill it before this one: hence the second look.
-        if not ours and any(not _is_leftover(entry.name) for entry in out.iterdir()) and not is_marked(out):
-            raise UserError(f"--out {out}: the folder contains files other than results; choose an empty or new folder")
+        refuse_other_files(out)
         _mark(out)
     except OSError as error:
         raise UserError(f"--out {out}: not writable ({error.strerror})") from error
+
+
+def refuse_other_files(out: Path) -> None:
+    """Check that the folder `out` contains nothing but results.
+
+    Raises:
+        UserError: it contains other files.
+        OSError: it is no folder, or cannot be read.
+    """
+    ours = is_marked(out) or any(out.glob(CELL_PATTERN))
+    # Another process may mark the folder after the first look and fill it before this one: hence the second look.
+    if not ours and any(not _is_leftover(entry.name) for entry in out.iterdir()) and not is_marked(out):
+        raise UserError(f"--out {out}: the folder contains files other than results; choose an empty or new folder")
 
 
 def is_marked(folder: Path) -> bool:

@@ -45,6 +45,8 @@ class Timings:
     train_s: float | None = None
     evaluate_s: float | None = None
     wall_s: float | None = None
+    peak_mb: float | None = None
+    """Most memory of the cell's process and its largest child, MB; absent from cells of former versions."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ import faulthandler
 import os
 import signal
 import sys
-import threading
 import traceback
 from collections.abc import Mapping
 from contextlib import suppress
@@ -24,7 +23,7 @@ from codesign_bench.code_version import code_version
 from codesign_bench.errors import UserError
 from codesign_bench.machine import host_facts, package_versions
 from codesign_bench.plugins import import_modules
-from codesign_bench.processes import EXIT_ORPHANED
+from codesign_bench.processes import watched_by_parent
 from codesign_bench.storage.cells import table_checksums
 from codesign_bench.storage.checkpoint import remove_checkpoint
 from codesign_bench.storage.files import remove_partial_files
@@ -151,22 +150,11 @@ def _run_and_record(resolved: ResolvedCell, folder: Path, record: CellRecord) ->
     return EXIT_DONE
 
 
-def _end_with_parent() -> None:
-    """End this process at once when its standard input closes; the system closes it when the parent dies."""
-
-    def wait() -> None:
-        while os.read(0, 4096):
-            pass
-        os._exit(EXIT_ORPHANED)
-
-    threading.Thread(target=wait, daemon=True).start()
-
-
 def start() -> None:
     """Run `main` as a separate process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; the parent handles it
     faulthandler.enable()
-    _end_with_parent()
+    watched_by_parent()
     code = main()
     with suppress(OSError, ValueError):  # the log is on a full disk, or closed
         sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""Run a grid of cells: plan the missing cells, distribute them over workers, report the outcomes."""
+"""Run a grid of cells: distribute those that are missing over workers, report the outcomes."""
 
 from __future__ import annotations
 
@@ -14,20 +14,18 @@ from rich.console import Console
 
 from codesign_bench.cell.cell import Cell, ResolvedCell
 from codesign_bench.config.run_settings import OVERSHOOT
-from codesign_bench.console import Log, printer
+from codesign_bench.console import Log, print_table, printer
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores
 from codesign_bench.startup import IMPORTS_VARIABLE
-from codesign_bench.storage.cells import StoredCell, stored_record
-from codesign_bench.storage.checkpoint import check_checkpoint
-from codesign_bench.storage.layout import CHECKPOINT_FILE, CURVE_FILE, open_folder, sweep_leftovers
+from codesign_bench.storage.layout import CURVE_FILE, open_folder, refuse_other_files, sweep_leftovers
 from codesign_bench.storage.locks import HOLDER_FILE, has_locks, is_locked
-from codesign_bench.storage.reading import DamagedFile
-from codesign_bench.storage.records import DONE, FAILED, INTERRUPTED, CellRecord
-from codesign_bench.storage.system_errors import momentary_cause
+from codesign_bench.storage.records import FAILED, INTERRUPTED
 from codesign_bench.sweep.backends import Backend, ClusterLost, WorkersDied, make_backend
+from codesign_bench.sweep.estimate import estimate, known_paces, row, untimed
+from codesign_bench.sweep.pace import measure, remember
+from codesign_bench.sweep.plan import Plan, make_plan
 from codesign_bench.sweep.progress import ProgressDisplay
-from codesign_bench.sweep.stale import StoredWith, code_notes, pretrained, refuse_other_code
 from codesign_bench.sweep.workers import BUSY, Job, Outcome
 
 EXIT_ALL_DONE, EXIT_SOME_FAILED = 0, 1
@@ -37,85 +35,12 @@ LOCK_POLL_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
-class Plan:
-    """The cells of a sweep by their state in the results folder."""
-
-    done: list[Cell]
-    failed: dict[Cell, str]
-    """Cells that failed earlier and are not retried, with their error messages."""
-    unusable: dict[Cell, str]
-    """Cells whose files are damaged or refused, with the reasons."""
-    unreadable: dict[Cell, str]
-    """Cells whose files cannot be read at the moment, with the reasons."""
-    pending: list[ResolvedCell]
-    notes: list[str]
-    """How the code differs from that of stored cells, one line each."""
-
-
-@dataclass(frozen=True)
 class Trouble:
     """The cells that are not done at the end of a sweep, with the reasons."""
 
     failed: dict[Cell, str]
     interrupted: dict[Cell, str]
     """Cells that the same command resumes."""
-
-
-def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = False, same_code: bool = False) -> Plan:
-    """Sort `cells` into done, failed and pending ones in `out`, before anything runs.
-
-    Raises:
-        UserError: a stored cell has another configuration, was run with other code of its task or method (unless
-            `same_code` says that this makes no difference), or one that cells start from is not done.
-    """
-    plan = Plan([], {}, {}, {}, [], [])
-    records: dict[Cell, CellRecord | None] = {}
-    for resolved in cells:
-        try:
-            records[resolved.cell] = stored_record(resolved.cell, out)
-        except UserError as error:
-            _set_aside(plan, resolved.cell, error)
-    readable = [resolved for resolved in cells if resolved.cell in records]
-    _refuse_other_configurations(readable, records, out)
-    _refuse_without_pretrained([resolved.cell for resolved in readable], out)
-    stored = [StoredWith(resolved, record) for resolved in readable if (record := records[resolved.cell]) is not None]
-    if not same_code:
-        refuse_other_code([*stored, *pretrained(readable, out)], out)
-    plan.notes.extend(code_notes(stored, retry_failed=retry_failed))
-    for resolved in readable:
-        _sort_into(plan, resolved, records[resolved.cell], out, retry_failed=retry_failed)
-    return plan
-
-
-def _sort_into(plan: Plan, resolved: ResolvedCell, record: CellRecord | None, out: Path, *, retry_failed: bool) -> None:
-    cell = resolved.cell
-    if record is not None and record.status == DONE and (problems := _problems(cell, record, out)):
-        plan.unusable[cell] = f"is done, but cannot be used: {problems}"
-    elif record is not None and record.status == DONE:
-        plan.done.append(cell)
-    elif record is not None and record.failure is not None and not retry_failed:
-        plan.failed[cell] = record.failure.message
-    else:
-        try:
-            check_checkpoint(cell.folder(out) / CHECKPOINT_FILE)  # reported before the sweep
-        except UserError as error:
-            _set_aside(plan, cell, error)
-        else:
-            plan.pending.append(resolved)
-
-
-def _set_aside(plan: Plan, cell: Cell, error: UserError) -> None:
-    cells = plan.unusable if momentary_cause(error) is None else plan.unreadable
-    cells[cell] = str(error)
-
-
-def _problems(cell: Cell, record: CellRecord, out: Path) -> str:
-    """Return which files of a finished cell cannot be used, and why; "" if all can."""
-    problems = StoredCell(cell.folder(out), record).problems
-    told = [f"{problem.path.name}: {problem.reason}" for problem in problems]
-    if problems and all(isinstance(problem, DamagedFile) for problem in problems):
-        told.append("delete its folder to run it again")
-    return "; ".join(told)
 
 
 def split_cores(cores: int, cells: int, threads: int, jobs: int | None) -> tuple[int, str]:
@@ -156,8 +81,7 @@ def run_sweep(
         KeyboardInterrupt: the user stopped the sweep; its processes have ended, and the same call resumes it.
     """
     plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code)
-    threads = max((resolved.config.run.threads for resolved in cells), default=1)
-    used_jobs, split = split_cores(available_cores(), len(plan.pending), threads, jobs)
+    used_jobs, split = _split(cells, plan, jobs)
     chosen = make_backend(backend, used_jobs, scheduler)
     say, trouble = printer(console), Trouble(plan.failed | plan.unusable, dict(plan.unreadable))
     with chosen if plan.pending else nullcontext() as workers:
@@ -165,13 +89,68 @@ def run_sweep(
         _begin(say, len(cells), plan, out)
         if workers is not None:
             say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
+            if scheduler is None:  # the machines of a cluster may be of any speed
+                say(estimate(plan.pending, used_jobs, known_paces(out)).line())
             say(f"cells finish their last episodes: at most {OVERSHOOT:.0%} over the budget, or one smallest batch")
             imported = os.environ.get(IMPORTS_VARIABLE, "")
-            queue = [Job(resolved.cell, str(out), retry_failed, imported, same_code) for resolved in plan.pending]
-            budgets = {resolved.cell: resolved.config.run.steps for resolved in plan.pending}
+            queue = [Job(pending.cell, str(out), retry_failed, imported, same_code) for pending in plan.pending]
+            budgets = {pending.cell: pending.resolved.config.run.steps for pending in plan.pending}
             with ProgressDisplay(console, out, budgets, used_jobs) as display:
                 _run_queue(queue, workers, display, trouble)
     return _conclude(say, len(cells), trouble, plan)
+
+
+def dry_run(
+    cells: Sequence[ResolvedCell],
+    out: Path,
+    *,
+    console: Console,
+    jobs: int | None = None,
+    retry_failed: bool = False,
+    same_code: bool = False,
+) -> int:
+    """Print what `run_sweep` would do with every cell, and how long it would take; return 0.
+
+    Kinds of cells that have not been timed on this machine are, for some seconds each, outside of `out`.
+
+    Raises:
+        UserError: the same that `run_sweep` raises before anything runs.
+    """
+    if out.exists():
+        try:
+            refuse_other_files(out)
+        except OSError as error:
+            raise UserError(f"--out {out}: not readable ({error.strerror})") from error
+    plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code)
+    used_jobs, split = _split(cells, plan, jobs)
+    say, known = printer(console), known_paces(out)
+    for kind, pending in untimed(plan.pending, known).items():
+        say(f"timing {pending.cell.task}/{pending.cell.method} ...")
+        known[kind] = measure(pending.resolved)[0]
+        remember({kind: known[kind]})
+    expected = estimate(plan.pending, used_jobs, known)
+    settled = {
+        **dict.fromkeys(plan.done, "done"),
+        **dict.fromkeys(plan.failed, "failed earlier"),
+        **dict.fromkeys(plan.unusable, "cannot be used"),
+        **dict.fromkeys(plan.unreadable, "cannot be read"),
+    }
+    to_run = {each.pending.cell: row(each) for each in expected.cells}
+    rows = [to_run.get(cell.cell) or (cell.cell.name, settled[cell.cell], "", "", "", "") for cell in cells]
+    print_table(console, ("cell", "state", "steps", "time", "memory", "known from"), rows)
+    for note in plan.notes:
+        say(note)
+    say(f"{len(cells)} cells, {len(plan.pending)} to run{f': {split}' if plan.pending else ''}")
+    if plan.pending:
+        say(expected.line())
+    say("nothing was run")
+    return EXIT_ALL_DONE
+
+
+def _split(cells: Sequence[ResolvedCell], plan: Plan, jobs: int | None) -> tuple[int, str]:
+    """Return how many of the pending cells run at a time, and a message on it."""
+    threads = max((resolved.config.run.threads for resolved in cells), default=1)
+    return split_cores(available_cores(), len(plan.pending), threads, jobs)
 
 
 def _begin(say: Log, cells: int, plan: Plan, out: Path) -> None:
@@ -248,34 +227,6 @@ def over(env_steps: float, budget: int) -> str:
     """Return by how much a cell has exceeded its budget to finish its last episodes, or nothing if by less than 1 %."""
     share = env_steps / budget - 1.0
     return f" ({share:.0%} over the budget)" if share >= 0.01 else ""
-
-
-def _refuse_other_configurations(
-    cells: Sequence[ResolvedCell], records: dict[Cell, CellRecord | None], out: Path
-) -> None:
-    refused = [
-        (resolved.cell, different)
-        for resolved in cells
-        if (record := records[resolved.cell]) is not None
-        and (different := resolved.differences(record.config, record.task_version))
-    ]
-    if refused:
-        cell, different = refused[0]
-        shown = "; ".join(different[:6]) + (f"; and {len(different) - 6} more" if len(different) > 6 else "")
-        others = f" (and {len(refused) - 1} more cells)" if len(refused) > 1 else ""
-        raise UserError(f"{cell.folder(out)}{others} was run with another configuration: {shown}\nchoose another --out")
-
-
-def _refuse_without_pretrained(cells: Sequence[Cell], out: Path) -> None:
-    for cell in cells:
-        if (before := cell.pretrained) is not None:
-            record = CellRecord.read(before.folder(out))
-            if record is None or record.status != DONE:
-                raise UserError(
-                    f"{cell.name} starts from {before.name}, which is not done in {out}\nfirst run: "
-                    f"codesign-bench run --method {cell.method} --task {cell.task} --seeds {cell.seed}-{cell.seed} "
-                    f"--profile {cell.profile} --out {out}, with the same --set if any"
-                )
 
 
 def _conclude(say: Log, cells: int, trouble: Trouble, plan: Plan) -> int:

@@ -13,6 +13,7 @@ from typing import Any
 
 from codesign_bench.cell.cell import Cell, ResolvedCell
 from codesign_bench.evaluation.evaluate import Evaluation, evaluate, rows
+from codesign_bench.machine import peak_megabytes
 from codesign_bench.method import BatchReport, Method
 from codesign_bench.seeding import Streams
 from codesign_bench.storage.cells import open_cell
@@ -81,9 +82,14 @@ class CellRun:
         self._write_final()
 
     def timings(self) -> Timings:
-        """Return the seconds of training, of evaluation, and in total, without interruptions."""
+        """Return the seconds of training, of evaluation, and in total, without interruptions, and the memory used."""
         progress = self.progress
-        return Timings(train_s=progress.train_s, evaluate_s=progress.evaluate_s, wall_s=self._wall_s())
+        return Timings(
+            train_s=progress.train_s,
+            evaluate_s=progress.evaluate_s,
+            wall_s=self._wall_s(),
+            peak_mb=round(peak_megabytes(), 1),
+        )
 
     def _train(self, remaining_steps: int) -> None:
         start = time.monotonic()

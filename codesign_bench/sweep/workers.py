@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
-import subprocess
-import sys
 import time
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,7 +14,7 @@ import filelock
 
 from codesign_bench.cell.cell import Cell
 from codesign_bench.errors import UserError
-from codesign_bench.processes import end_with, existing_folder, thread_environment
+from codesign_bench.processes import end_with, python_process, thread_environment
 from codesign_bench.startup import IMPORTS_VARIABLE
 from codesign_bench.storage.layout import LOG_FILE, PROGRESS_FILE
 from codesign_bench.storage.locks import is_locked, locked
@@ -27,11 +24,6 @@ from codesign_bench.sweep import cell_process
 
 BUSY = "busy"
 """The outcome of a cell that another sweep is running."""
-START = (
-    "import sys; sys.path[:] = filter(None, sys.path); import json; sys.path[:] = json.loads(sys.argv.pop(1)); "
-    "from codesign_bench.sweep.cell_process import start; start()"
-)
-"""Starts a cell's process with this process's module path; nothing is imported from the working folder."""
 SETTLE_SECONDS = 1.0
 STOPPING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 """Signals by which people and clusters stop a process."""
@@ -114,16 +106,11 @@ def _open_log(folder: Path) -> BinaryIO:
 
 
 def _run_process(job: Job, folder: Path) -> int:
-    path = [entry for entry in sys.path if entry]  # an empty entry is the working folder
-    command = [sys.executable, "-c", START, json.dumps(path), job.cell.to_json(), job.out]
+    flags = [name for name, chosen in (("retry", job.retry_failed), ("same-code", job.same_code)) if chosen]
+    environment = {**thread_environment(), IMPORTS_VARIABLE: job.imported}
     with _open_log(folder) as log:
-        process = subprocess.Popen(
-            [*command, *(["retry"] if job.retry_failed else []), *(["same-code"] if job.same_code else [])],
-            stdin=subprocess.PIPE,  # never written to; it closes when the parent dies, which ends the process
-            stdout=log,
-            stderr=log,
-            cwd=existing_folder(),
-            env={**thread_environment(), IMPORTS_VARIABLE: job.imported},
+        process = python_process(
+            cell_process.__name__, job.cell.to_json(), job.out, *flags, stdout=log, stderr=log, env=environment
         )
         try:
             return process.wait()

@@ -42,6 +42,37 @@ def test_another_configuration_is_refused(tmp_path: Path, capsys: pytest.Capture
     assert "episodes: stored 4, requested 9" in capsys.readouterr().err
 
 
+def test_a_dry_run_lists_every_cell_and_leaves_everything_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    out = tmp_path / "runs"
+    grid = [*RUN, "--seeds", "2", "--out", str(out)]
+    assert main([*grid, "--dry-run"]) == 0
+    assert not out.exists()
+    first = capsys.readouterr().out
+    assert "timing toy_reach/toy_search ..." in first
+    assert [line.split()[1] for line in first.splitlines() if "/seed-" in line] == ["run", "run"]
+    assert main([*RUN, "--out", str(out)]) == 0
+    assert "expected to take " in capsys.readouterr().out  # known from the dry run
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    assert main([*grid, "--dry-run"]) == 0
+    second = capsys.readouterr().out
+    assert [line.split()[1] for line in second.splitlines() if "/seed-" in line] == ["done", "run"]
+    assert "timing" not in second
+    assert "2 cells, 1 to run: 1 at a time with 1 thread each" in second
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_a_dry_run_refuses_what_a_run_would(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "thesis.tex").write_text("")
+    assert main([*RUN, "--dry-run", "--out", str(tmp_path)]) == 2
+    assert main([*RUN, "--dry-run", "--out", str(tmp_path / "thesis.tex")]) == 2
+    told = capsys.readouterr().err.strip().splitlines()
+    assert "contains files other than results" in told[0]
+    assert "(Not a directory)" in told[1]
+
+
 def test_settings_of_a_search_are_those_of_the_cells_task_and_method(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -84,9 +84,9 @@ def test_random_streams_go_on_where_they_stood(tmp_path: Path) -> None:
     np.testing.assert_array_equal(resumed["search"].normal(size=4), expected)
 
 
-@READERS
-def test_no_checkpoint_is_none(tmp_path: Path, read: Read) -> None:
-    assert read(tmp_path / "checkpoint") is None
+def test_no_checkpoint_is_none_of_any_steps(tmp_path: Path) -> None:
+    assert load_checkpoint(tmp_path / "checkpoint") is None
+    assert check_checkpoint(tmp_path / "checkpoint") == 0
 
 
 @READERS

@@ -11,14 +11,13 @@ import pytest
 from builders import sweep
 from builders import toy_cells as cells
 from codesign_bench import load_results
-from codesign_bench.cell.cell import Cell, resolve_cells
+from codesign_bench.cell.cell import Cell
 from codesign_bench.cell.variant import Variant
 from codesign_bench.errors import UserError
 from codesign_bench.storage.layout import CHECKPOINT_FILE, LOG_FILE, MARKER_FILE, PROGRESS_FILE, open_folder
 from codesign_bench.storage.locks import LOCK_FILE
 from codesign_bench.storage.records import CellRecord
-from codesign_bench.sweep.runner import make_plan, split_cores
-from toy import ToyReach
+from codesign_bench.sweep.runner import split_cores
 
 pytestmark = pytest.mark.usefixtures("toy")
 
@@ -91,8 +90,6 @@ def test_a_failed_cell_is_reported_and_retried_only_when_asked(tmp_path: Path) -
     code, text = sweep(broken, tmp_path)
     assert (code, "failed earlier" in text) == (1, True)
     assert stored(broken[0], tmp_path).timings.ended == ended
-    plan = make_plan(resolve_cells(broken), tmp_path, retry_failed=True)
-    assert [resolved.cell for resolved in plan.pending] == broken
 
 
 def test_a_process_that_is_killed_is_named_and_the_sweep_goes_on(tmp_path: Path) -> None:
@@ -103,24 +100,6 @@ def test_a_process_that_is_killed_is_named_and_the_sweep_goes_on(tmp_path: Path)
     assert "killed by SIGKILL" in str(stored(killed[0], tmp_path).failure)
     assert "killed by SIGKILL" in text
     assert stored(good[0], tmp_path).status == "done"
-
-
-def test_another_configuration_is_refused_with_the_difference(tmp_path: Path) -> None:
-    sweep([CELL], tmp_path)
-    with pytest.raises(UserError, match="episodes: stored 4, requested 5") as caught:
-        make_plan(resolve_cells(cells(2, overrides=("evaluations=4", "episodes=5"))), tmp_path)
-    assert CELL.name in str(caught.value)
-    assert str(caught.value).count("\n") <= 1
-    with pytest.raises(UserError, match="steps: stored 200, requested 300"):
-        make_plan(resolve_cells(cells(1, steps=300)), tmp_path)
-    assert make_plan(resolve_cells(cells(1, profile="quick")), tmp_path).done
-
-
-def test_cells_of_another_version_of_their_task_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    sweep([CELL], tmp_path)
-    monkeypatch.setattr(ToyReach, "version", 2)
-    with pytest.raises(UserError, match="version of task 'toy_reach': stored 1, requested 2"):
-        make_plan(resolve_cells(cells(1)), tmp_path)
 
 
 @pytest.mark.parametrize("damaged", [CHECKPOINT_FILE, "cell.json"])

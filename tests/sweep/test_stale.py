@@ -14,7 +14,7 @@ from codesign_bench.cell.cell import resolve_cells
 from codesign_bench.cell.variant import Variant
 from codesign_bench.errors import UserError
 from codesign_bench.storage.records import FAILED, RUNNING
-from codesign_bench.sweep.runner import make_plan
+from codesign_bench.sweep.plan import make_plan
 
 pytestmark = pytest.mark.usefixtures("toy")
 

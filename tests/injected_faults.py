@@ -168,6 +168,7 @@ def fork(call: Callable[[], int], log: BinaryIO) -> int:
         except BaseException:
             traceback.print_exc()
         finally:
+            sys.stdout.flush()  # as a cell's process does; what is still buffered would be lost
             os._exit(code)
     return pid
 

@@ -287,3 +287,16 @@ def _without_unusable(
 def _words(given: Sequence[str]) -> list[str]:
     """Return the words of an argument; each part of the command line may contain several, separated by commas."""
     return [word for text in given for word in text.split(",") if word]
+
+
+def check_device(device: str | None) -> None:
+    """Check that a requested GPU is available, for `--device` and for `--set device`.
+
+    Raises:
+        UserError: it is not.
+    """
+    if device == "cuda":
+        import torch
+
+        if not torch.cuda.is_available():
+            raise UserError("--device cuda: torch finds no CUDA device on this machine; choose cpu")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from typing import Annotated
+from typing import Annotated, get_args
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import ALL, Jobs, OfKind, chosen_tasks, out_file
-from codesign_bench.config.profiles import profile_named
+from codesign_bench.cli.arguments import ALL, Jobs, OfKind, check_device, chosen_methods, chosen_tasks, out_file
+from codesign_bench.config.profiles import DEFAULT_PROFILE, profile_named
+from codesign_bench.config.run_settings import Device
 from codesign_bench.config.values import Within
 from codesign_bench.console import printer
 from codesign_bench.errors import unknown_name
@@ -21,7 +22,7 @@ HELP = "measure the speed of tasks and learners on this machine"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what is measured and how."""
-    kinds = parser.add_subparsers(required=True, metavar="tasks|learner", dest="what")
+    kinds = parser.add_subparsers(required=True, metavar="tasks|learner|sweep", dest="what")
     tasks = kinds.add_parser(
         "tasks", help="environment steps, compared with the bare physics engine", allow_abbrev=False
     )
@@ -48,6 +49,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     learner.add_argument("--repeats", type=OfKind(Passes), default=3, metavar="N", help="timed batches; default: 3")
     learner.add_argument("--only", nargs="+", metavar="NAME", help="names of learners; default: all")
     learner.add_argument("--out", type=out_file, metavar="FILE", help="also write the numbers to this JSON file")
+    _add_sweep(kinds.add_parser("sweep", help="cells per hour of tasks, methods and profiles", allow_abbrev=False))
+
+
+def _add_sweep(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--task", required=True, nargs="+", metavar="T", help="names, or all")
+    parser.add_argument("--method", required=True, nargs="+", metavar="M", help="names, all, or beyond")
+    parser.add_argument("--profile", nargs="+", metavar="P", help="names; default: laptop and the paper's")
+    parser.add_argument("--device", choices=get_args(Device), help="device for network updates; default: cpu")
+    parser.add_argument("--jobs", type=OfKind(Jobs), metavar="N", help="cells side by side; default: one per core")
+    parser.add_argument("--out", type=out_file, metavar="FILE", help="also write the numbers to this JSON file")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -57,6 +68,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
         bench_tasks(chosen_tasks(options.task, printer(console)), options.seconds, console)
         return 0
+    if options.what == "sweep":
+        return _run_sweep(options, console)
     from codesign_bench.benchmarks.learner import bench_learner, contestants
     from codesign_bench.benchmarks.workload import Workload
 
@@ -77,4 +90,26 @@ def run(options: argparse.Namespace, console: Console) -> int:
         repeats=options.repeats,
     )
     bench_learner(work, wanted, options.out, console)
+    return 0
+
+
+def _run_sweep(options: argparse.Namespace, console: Console) -> int:
+    from codesign_bench.benchmarks.sweep import bench_sweep
+    from codesign_bench.benchmarks.workload import study_profile
+
+    log = printer(console)
+    profiles = options.profile or [DEFAULT_PROFILE, study_profile()]
+    for name in profiles:
+        profile_named(name)
+    overrides = [] if options.device is None else [f"device={options.device}"]
+    check_device(options.device)
+    bench_sweep(
+        chosen_tasks(options.task, log),
+        chosen_methods(options.method, log),
+        profiles,
+        overrides,
+        options.jobs,
+        options.out,
+        console,
+    )
     return 0

@@ -21,6 +21,7 @@ from codesign_bench.cli.arguments import (
     add_out,
     add_same_code,
     add_sweep,
+    check_device,
     check_once,
     chosen_methods,
     chosen_tasks,
@@ -99,7 +100,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     )
     resolved = resolve_cells(list(cells) if options.tuned is None else tuned_cells(cells, options.tuned))
     for device in {cell.config.run.device for cell in resolved}:
-        _check_device(device)
+        check_device(device)
     if options.dry_run:
         return dry_run(
             resolved,
@@ -172,16 +173,3 @@ def overrides(options: argparse.Namespace) -> list[str]:
         keys = {field.name for name in methods for field in fields(load_method(name).config_class)}
         result += [f"precision={chosen}"] if "precision" in keys else []
     return result
-
-
-def _check_device(device: str) -> None:
-    """Check that a requested GPU is available, for `--device` and for `--set device`.
-
-    Raises:
-        UserError: it is not.
-    """
-    if device == "cuda":
-        import torch
-
-        if not torch.cuda.is_available():
-            raise UserError("--device cuda: torch finds no CUDA device on this machine; choose cpu")

@@ -153,7 +153,7 @@ def measure(resolved: ResolvedCell, at_a_time: int = 1) -> list[Pace]:
     processes = [python_process(__name__, cell, stderr=subprocess.STDOUT) for _ in range(at_a_time)]
     try:
         # Not `communicate`, which would close the pipe by which they know that this process is alive.
-        outputs = [process.stdout.read() for process in processes]
+        outputs = ["" if process.stdout is None else process.stdout.read() for process in processes]
         codes = [process.wait() for process in processes]
     finally:
         for process in processes:

@@ -6,6 +6,8 @@ import traceback
 from collections.abc import Iterable
 from pathlib import Path
 
+from codesign_bench.visible_text import on_one_line
+
 
 class UserError(Exception):
     """Bad input; the command line reports it in one or two lines (exit code 2)."""
@@ -29,7 +31,7 @@ class UnknownNameError(UserError):
 
 def unknown_name(kind: str, name: str, choices: Iterable[str]) -> UnknownNameError:
     """Return the error for a name that is not among `choices`; its message lists them."""
-    return UnknownNameError(f"unknown {kind} '{name}'; choose from: {', '.join(choices)}")
+    return UnknownNameError(f"unknown {kind} '{on_one_line(name)}'; choose from: {', '.join(choices)}")
 
 
 def in_one_line(error: BaseException) -> str:

@@ -52,6 +52,7 @@ REQUIRED = {
     "deploy": ("--policy", "nowhere"),
     "export": ("--policy", "nowhere", "--out", "new"),
     "reference": ("--task", "push"),
+    "bench sweep": ("--task", "push", "--method", "cma_es"),
 }
 """What each command needs before anything else can be wrong; others need nothing."""
 RUN = ("run", "--method", "gnn_ppo", "cma_rl", "cma_es", "--task", "push", "--out", "new/runs", "--set")
@@ -126,7 +127,7 @@ def _choices(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentPars
 def of_options() -> Iterator[Line]:
     """Yield every option of every command with every kind of value that it must refuse, and without any."""
     for words, parser in commands():
-        needed = REQUIRED.get(words[0], ())
+        needed = REQUIRED.get(" ".join(words), ())
         for action in parser._actions:
             if action.option_strings and action.nargs != 0:
                 (option, *_) = action.option_strings
@@ -145,7 +146,7 @@ def of_names() -> Iterator[Line]:
     """Yield names of members that there are not, for every option that takes one."""
     meant = {"--task": "task", "--method": "method", "--study": "study", "--profile": "profile", "--only": "learner"}
     for words, parser in commands():
-        needed = REQUIRED.get(words[0], ())
+        needed = REQUIRED.get(" ".join(words), ())
         for action in parser._actions:
             for option in set(action.option_strings) & set(meant):
                 for name in ("no_such_name", "PUSH", "push/..", "\x1b[2J", LONG):

@@ -6,6 +6,7 @@ import os
 import platform
 import re
 import socket
+import sys
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,8 @@ LIBRARY_SETTINGS = (
     "GLIBC_TUNABLES",
 )
 """Environment variables that make these libraries choose otherwise."""
+CUDA_CONTEXT = 500.0
+"""About what the CUDA context of a process takes on a GPU beside its tensors, MB (ours)."""
 BFLOAT16_FLAGS = ("amx_bf16", "avx512_bf16", "bf16")
 """CPU flags that indicate bfloat16 arithmetic: two of x86 (Intel, AMD) and one of ARM."""
 
@@ -87,6 +90,21 @@ def total_megabytes() -> float | None:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2**20
     except (AttributeError, OSError, ValueError):
         return None
+
+
+def gpu_megabytes() -> float | None:
+    """Return the most GPU memory that this process has used, in MB; None: it has used no GPU."""
+    torch = sys.modules.get("torch")
+    if torch is None or not torch.cuda.is_initialized():
+        return None
+    return CUDA_CONTEXT + float(torch.cuda.max_memory_reserved()) / 2**20
+
+
+def total_gpu_megabytes() -> float | None:
+    """Return the memory of the GPU that cells use, in MB; None: there is none. This imports torch."""
+    import torch
+
+    return torch.cuda.get_device_properties(0).total_memory / 2**20 if torch.cuda.is_available() else None
 
 
 def peak_megabytes() -> float:

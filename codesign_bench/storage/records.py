@@ -47,6 +47,8 @@ class Timings:
     wall_s: float | None = None
     peak_mb: float | None = None
     """Most memory of the cell's process and its largest child, MB; absent from cells of former versions."""
+    gpu_mb: float | None = None
+    """The same on the GPU; None: it used none."""
 
 
 @dataclass(frozen=True)

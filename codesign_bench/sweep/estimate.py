@@ -8,7 +8,7 @@ from pathlib import Path
 
 from codesign_bench.console import duration
 from codesign_bench.errors import UserError
-from codesign_bench.machine import total_megabytes
+from codesign_bench.machine import total_gpu_megabytes, total_megabytes
 from codesign_bench.storage.cells import find_cells
 from codesign_bench.sweep.pace import Kind, Pace, kind_of, measured_before, of_finished
 from codesign_bench.sweep.plan import Pending
@@ -16,6 +16,8 @@ from codesign_bench.sweep.progress import seconds_until_done
 
 START_SECONDS = 5.0
 """Time in which a cell's process starts (ours)."""
+MEMORY_SHARE = 0.8
+"""Cells together use at most this share of a memory, unless `--jobs` says otherwise (ours)."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,19 @@ def untimed(cells: Iterable[Pending], known: Mapping[Kind, Pace]) -> dict[Kind, 
     for cell in cells:
         kinds.setdefault(kind_of(cell.resolved), cell)
     return {kind: cell for kind, cell in kinds.items() if kind not in known}
+
+
+def fitting(cells: Iterable[Pending], known: Mapping[Kind, Pace]) -> int | None:
+    """Return how many of the largest of these cells fit in the memory of this machine and of its GPU; None: unknown."""
+    paces = [pace for cell in cells if (pace := known.get(kind_of(cell.resolved))) is not None]
+    own = max((pace.peak_mb for pace in paces if pace.peak_mb), default=None)
+    on_gpu = max((pace.gpu_mb for pace in paces if pace.gpu_mb), default=None)
+    there = [
+        (needed, total)
+        for needed, total in ((own, total_megabytes()), (on_gpu, total_gpu_megabytes() if on_gpu else None))
+        if needed and total
+    ]
+    return min((max(1, int(MEMORY_SHARE * total / needed)) for needed, total in there), default=None)
 
 
 def gigabytes(megabytes: float) -> str:

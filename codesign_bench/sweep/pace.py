@@ -22,7 +22,7 @@ from typing import Any, TypeAlias
 from codesign_bench import __version__
 from codesign_bench.cell.cell import Cell, ResolvedCell, resolve_cell
 from codesign_bench.evaluation.evaluate import evaluate
-from codesign_bench.machine import host_facts, peak_megabytes
+from codesign_bench.machine import gpu_megabytes, host_facts, peak_megabytes
 from codesign_bench.plugins import import_modules
 from codesign_bench.processes import python_process, watched_by_parent
 from codesign_bench.seeding import Streams
@@ -51,6 +51,8 @@ class Pace:
     peak_mb: float | None
     """Memory of its processes, MB; None: not recorded."""
     source: str
+    gpu_mb: float | None = None
+    """Memory on the GPU, MB; None: it uses none."""
 
     def seconds(self, steps: int, evaluations: float) -> float:
         """Return how long training takes for so many steps, with so many evaluations."""
@@ -107,9 +109,12 @@ def _mean(records: list[CellRecord]) -> Pace:
     trained = sum(record.timings.train_s or 0.0 for record in records)
     evaluated = sum(record.timings.evaluate_s or 0.0 for record in records)
     evaluations = sum(1 + int(record.config.run["evaluations"][0]) for record in records)
-    peaks = [record.timings.peak_mb for record in records if record.timings.peak_mb is not None]
     steps = sum(record.env_steps for record in records)
-    return Pace(steps / trained, evaluated / evaluations, max(peaks, default=None), FINISHED)
+    peak_mb, gpu_mb = (
+        max((each for record in records if (each := getattr(record.timings, name)) is not None), default=None)
+        for name in ("peak_mb", "gpu_mb")
+    )
+    return Pace(steps / trained, evaluated / evaluations, peak_mb, FINISHED, gpu_mb)
 
 
 def cache_file() -> Path:
@@ -131,7 +136,8 @@ def _pace(values: Mapping[str, Any]) -> Pace:
     steps_per_second, evaluation_s = number(values, "steps_per_second"), number(values, "evaluation_s")
     if not (steps_per_second > 0.0 and evaluation_s >= 0.0):
         raise ValueError("not a speed")
-    return Pace(steps_per_second, evaluation_s, optional(number, values, "peak_mb"), MEASURED)
+    peak_mb, gpu_mb = (optional(number, values, name) for name in ("peak_mb", "gpu_mb"))
+    return Pace(steps_per_second, evaluation_s, peak_mb, MEASURED, gpu_mb)
 
 
 def remember(paces: Mapping[Kind, Pace]) -> None:
@@ -183,7 +189,7 @@ def measure_here(resolved: ResolvedCell) -> Pace:
         done += report.env_steps
     trained_s, started = time.monotonic() - timed_from, time.monotonic()
     evaluate(problem.task, method.policy(), problem.tradeoff, problem.evaluation_instances(), problem.simulators)
-    return Pace(timed_steps / trained_s, time.monotonic() - started, peak_megabytes(), MEASURED)
+    return Pace(timed_steps / trained_s, time.monotonic() - started, peak_megabytes(), MEASURED, gpu_megabytes())
 
 
 def start() -> None:

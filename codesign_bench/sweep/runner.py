@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,8 +22,8 @@ from codesign_bench.storage.layout import CURVE_FILE, open_folder, refuse_other_
 from codesign_bench.storage.locks import HOLDER_FILE, has_locks, is_locked
 from codesign_bench.storage.records import FAILED, INTERRUPTED
 from codesign_bench.sweep.backends import Backend, ClusterLost, WorkersDied, make_backend
-from codesign_bench.sweep.estimate import estimate, known_paces, row, untimed
-from codesign_bench.sweep.pace import measure, remember
+from codesign_bench.sweep.estimate import estimate, fitting, known_paces, row, untimed
+from codesign_bench.sweep.pace import Kind, Pace, measure, remember
 from codesign_bench.sweep.plan import Plan, make_plan
 from codesign_bench.sweep.progress import ProgressDisplay
 from codesign_bench.sweep.workers import BUSY, Job, Outcome
@@ -43,7 +43,7 @@ class Trouble:
     """Cells that the same command resumes."""
 
 
-def split_cores(cores: int, cells: int, threads: int, jobs: int | None) -> tuple[int, str]:
+def split_cores(cores: int, cells: int, threads: int, jobs: int | None, fit: int | None = None) -> tuple[int, str]:
     """Return how many cells run at a time, and a message on the split of the cores.
 
     Args:
@@ -51,6 +51,7 @@ def split_cores(cores: int, cells: int, threads: int, jobs: int | None) -> tuple
         cells: number of cells to run.
         threads: threads of one cell.
         jobs: the requested number of cells at a time, or None; jobs x threads never exceeds the cores.
+        fit: how many cells fit in the memory, or None if that is unknown; a requested number overrides it.
 
     Raises:
         UserError: one cell needs more threads than there are cores.
@@ -58,8 +59,10 @@ def split_cores(cores: int, cells: int, threads: int, jobs: int | None) -> tuple
     if threads > cores:
         raise UserError(f"--set threads={threads}: there are only {cores} cores")
     most = cores // threads
-    used = max(1, min(most, cells, jobs or most))
+    used = max(1, min(most, cells, jobs or fit or most))
     notice = f" (--jobs {jobs} would need more cores than there are)" if jobs is not None and jobs > most else ""
+    if jobs is None and fit is not None and fit < min(most, cells):
+        notice = " (more would not fit in the memory; --jobs overrides this)"
     return used, f"{used} at a time with {threads} thread{'s' * (threads > 1)} each on {cores} cores{notice}"
 
 
@@ -81,7 +84,8 @@ def run_sweep(
         KeyboardInterrupt: the user stopped the sweep; its processes have ended, and the same call resumes it.
     """
     plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code)
-    used_jobs, split = _split(cells, plan, jobs)
+    known = known_paces(out)
+    used_jobs, split = _split(cells, plan, jobs, known)
     chosen = make_backend(backend, used_jobs, scheduler)
     say, trouble = printer(console), Trouble(plan.failed | plan.unusable, dict(plan.unreadable))
     with chosen if plan.pending else nullcontext() as workers:
@@ -90,7 +94,7 @@ def run_sweep(
         if workers is not None:
             say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
             if scheduler is None:  # the machines of a cluster may be of any speed
-                say(estimate(plan.pending, used_jobs, known_paces(out)).line())
+                say(estimate(plan.pending, used_jobs, known).line())
             say(f"cells finish their last episodes: at most {OVERSHOOT:.0%} over the budget, or one smallest batch")
             imported = os.environ.get(IMPORTS_VARIABLE, "")
             queue = [Job(pending.cell, str(out), retry_failed, imported, same_code) for pending in plan.pending]
@@ -122,12 +126,12 @@ def dry_run(
         except OSError as error:
             raise UserError(f"--out {out}: not readable ({error.strerror})") from error
     plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code)
-    used_jobs, split = _split(cells, plan, jobs)
     say, known = printer(console), known_paces(out)
     for kind, pending in untimed(plan.pending, known).items():
         say(f"timing {pending.cell.task}/{pending.cell.method} ...")
         known[kind] = measure(pending.resolved)[0]
         remember({kind: known[kind]})
+    used_jobs, split = _split(cells, plan, jobs, known)
     expected = estimate(plan.pending, used_jobs, known)
     settled = {
         **dict.fromkeys(plan.done, "done"),
@@ -147,10 +151,10 @@ def dry_run(
     return EXIT_ALL_DONE
 
 
-def _split(cells: Sequence[ResolvedCell], plan: Plan, jobs: int | None) -> tuple[int, str]:
+def _split(cells: Sequence[ResolvedCell], plan: Plan, jobs: int | None, known: Mapping[Kind, Pace]) -> tuple[int, str]:
     """Return how many of the pending cells run at a time, and a message on it."""
     threads = max((resolved.config.run.threads for resolved in cells), default=1)
-    return split_cores(available_cores(), len(plan.pending), threads, jobs)
+    return split_cores(available_cores(), len(plan.pending), threads, jobs, fitting(plan.pending, known))
 
 
 def _begin(say: Log, cells: int, plan: Plan, out: Path) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 from codesign_bench.cell.cell import Cell, ResolvedCell
 from codesign_bench.evaluation.evaluate import Evaluation, evaluate, rows
-from codesign_bench.machine import peak_megabytes
+from codesign_bench.machine import gpu_megabytes, peak_megabytes
 from codesign_bench.method import BatchReport, Method
 from codesign_bench.seeding import Streams
 from codesign_bench.storage.cells import open_cell
@@ -89,6 +89,7 @@ class CellRun:
             evaluate_s=progress.evaluate_s,
             wall_s=self._wall_s(),
             peak_mb=round(peak_megabytes(), 1),
+            gpu_mb=gpu_megabytes(),
         )
 
     def _train(self, remaining_steps: int) -> None:

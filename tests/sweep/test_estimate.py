@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from builders import sweep, toy_cells
 from codesign_bench.cell.cell import Cell, resolve_cells
-from codesign_bench.sweep.estimate import START_SECONDS, estimate, known_paces, row, untimed
+from codesign_bench.sweep.estimate import START_SECONDS, estimate, fitting, known_paces, row, untimed
 from codesign_bench.sweep.pace import CACHE_VARIABLE, FINISHED, MEASURED, Pace, kind_of, remember
 from codesign_bench.sweep.plan import Pending, make_plan
 
@@ -72,3 +73,15 @@ def test_steps_of_a_checkpoint_count_as_taken(tmp_path: Path) -> None:
     (expected,) = estimate([cell], 1, {}).cells
     assert expected.state == f"resume at {cell.env_steps / 200:.0%}"
     assert cell.env_steps >= 50
+
+
+def test_cells_that_do_not_fit_in_the_memory_do_not_run_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    cells = pending(4)
+    kind = kind_of(cells[0].resolved)
+    monkeypatch.setattr("codesign_bench.sweep.estimate.total_megabytes", lambda: 1_000.0)
+    monkeypatch.setattr("codesign_bench.sweep.estimate.total_gpu_megabytes", lambda: 2_000.0)
+    assert fitting(cells, {}) is None
+    assert fitting(cells, {kind: PACE}) == 2  # of 300 MB each in 800
+    assert fitting(cells, {kind: replace(PACE, gpu_mb=500.0)}) == 2
+    assert fitting(cells, {kind: replace(PACE, gpu_mb=1_500.0)}) == 1
+    assert fitting(cells, {kind: replace(PACE, peak_mb=5_000.0)}) == 1

@@ -205,3 +205,10 @@ def test_jobs_times_threads_never_exceeds_the_cores(
     assert (jobs is not None and jobs * threads > cores) == ("would need more cores" in line)
     with pytest.raises(UserError, match="cores"):
         split_cores(cores, count, cores + 1, jobs)
+
+
+def test_fewer_cells_run_at_a_time_if_more_do_not_fit_unless_they_are_asked_for() -> None:
+    used, line = split_cores(8, cells=20, threads=1, jobs=None, fit=3)
+    assert (used, "more would not fit in the memory" in line) == (3, True)
+    assert split_cores(8, cells=20, threads=1, jobs=5, fit=3)[0] == 5
+    assert split_cores(8, cells=2, threads=1, jobs=None, fit=3) == split_cores(8, cells=2, threads=1, jobs=None)

@@ -13,6 +13,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+from scipy.special import ndtr
+
 from codesign_bench.task import Floats, Singles, Slots
 
 
@@ -77,6 +80,23 @@ class FixedDesigns(Explorer):
         """Return the instances that were chosen, from the first again after the last."""
         chosen = self.trial.instances
         return None if chosen is None else chosen[slots, episode % chosen.shape[1]]
+
+    def sample_control(self, slots: Slots, observation: Singles, noise: Singles) -> Sample:
+        """Return the other explorer's controls."""
+        return self.explorer.sample_control(slots, observation, noise)
+
+
+class UniformDesigns(Explorer):
+    """Another explorer's controls with a design for each episode that is drawn uniformly from [-1, 1]^D."""
+
+    def __init__(self, explorer: Explorer) -> None:
+        super().__init__(explorer.design_noise, explorer.control_noise)
+        self.explorer = explorer
+
+    def sample_design(self, slots: Slots, observation: Singles, noise: Singles) -> Sample:
+        """Return the designs (b, D) that standard-normal `noise` (b, D) stands for."""
+        # The distribution function of the noise is uniform on [0, 1].
+        return Sample((2.0 * ndtr(noise) - 1.0).astype(np.float32))
 
     def sample_control(self, slots: Slots, observation: Singles, noise: Singles) -> Sample:
         """Return the other explorer's controls."""

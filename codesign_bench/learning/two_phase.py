@@ -20,7 +20,7 @@ from codesign_bench.learning.checkpointing import learner_arrays, load_learner_a
 from codesign_bench.learning.compute import Compute
 from codesign_bench.learning.credit import DesignCredit, JointCredit, NoCredit, SeparateCredit, Steps
 from codesign_bench.learning.critic import Critic, Estimates
-from codesign_bench.learning.explorer import Explorer, FixedDesigns, Trial
+from codesign_bench.learning.explorer import Explorer
 from codesign_bench.learning.fixed_updates import Batch, FixedPolicyUpdate, FixedUpdates, FixedValueUpdate
 from codesign_bench.learning.optimizers import Annealing, adam
 from codesign_bench.learning.ppo import LogProbs, PolicyLoss, PolicyUpdate, ValueUpdate, normalized
@@ -32,8 +32,9 @@ from codesign_bench.method import BatchReport, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Slots
 
-ChooseTrial = Callable[[int, int], Trial]
-"""Maps the steps and the number of slots of the batch to come to what it tries; the trial may use fewer slots."""
+GiveDesigns = Callable[[Explorer, int, int], tuple[Explorer, int]]
+"""Maps the actor's explorer, and the steps and the number of slots of the batch to come, to an explorer that chooses
+the designs in the actor's place, and to the number of slots, which may be smaller."""
 
 
 class TwoPhaseLearner:
@@ -46,11 +47,11 @@ class TwoPhaseLearner:
         streams: Streams,
         actor: Actor,
         value: ValueNetwork,
-        choose_trial: ChooseTrial | None = None,
+        give_designs: GiveDesigns | None = None,
         loop: UpdateLoop | None = None,
     ) -> None:
         self.problem, self.config, self.streams = problem, config, streams
-        self.actor, self.value, self.choose_trial = actor, value, choose_trial
+        self.actor, self.value, self.give_designs = actor, value, give_designs
         self.collector = BatchCollector(problem, streams)
         self.compute = Compute(config.precision)
         self.loop = loop or UpdateLoop()
@@ -66,7 +67,7 @@ class TwoPhaseLearner:
         self.env_steps = 0
 
     def _make_credit(self) -> DesignCredit:
-        if self.choose_trial is not None:
+        if self.give_designs is not None:
             return NoCredit(self.actor, self.compute)
         if self.config.design_credit == "joint":
             return JointCredit(self.actor, self.compute)
@@ -112,9 +113,8 @@ class TwoPhaseLearner:
     def collect(self, steps: int, slots: int, most: int | None = None) -> Trajectories:
         """Return about `steps` environment steps of whole episodes, in at most `slots` slots; see `BatchCollector`."""
         explorer: Explorer = GaussianExplorer(self.actor)
-        if self.choose_trial is not None:
-            trial = self.choose_trial(steps, slots)
-            explorer, slots = FixedDesigns(explorer, trial), len(trial.unit_designs)
+        if self.give_designs is not None:
+            explorer, slots = self.give_designs(explorer, steps, slots)
         return self.collector.collect(explorer, steps, slots, most)
 
     def update(self, batch: Trajectories) -> dict[str, float]:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from codesign_bench.learning.ppo import PolicyUpdate, Update, ValueUpdate
-from codesign_bench.learning.two_phase import ChooseTrial, TwoPhaseLearner
+from codesign_bench.learning.two_phase import GiveDesigns, TwoPhaseLearner
 from codesign_bench.learning.update_loop import UpdateLoop
 from codesign_bench.method import Problem, load_method
 from codesign_bench.seeding import Streams
@@ -64,7 +64,7 @@ def make_learner(reach: Task) -> MakeLearner:
 
     def make(
         seed: int = 0,
-        choose_trial: ChooseTrial | None = None,
+        give_designs: GiveDesigns | None = None,
         loop: UpdateLoop | None = None,
         problem: Problem | None = None,
         **changes: Any,
@@ -74,6 +74,6 @@ def make_learner(reach: Task) -> MakeLearner:
         streams = Streams(seed)
         actor = method_class.make_actor(reach, config, streams["policy weights"])
         value = method_class.make_value(reach, config, streams["value weights"])
-        return TwoPhaseLearner(problem or Problem(reach), config, streams, actor, value, choose_trial, loop)
+        return TwoPhaseLearner(problem or Problem(reach), config, streams, actor, value, give_designs, loop)
 
     return make

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from codesign_bench.learning.credit import JointCredit, NoCredit, SeparateCredit, Steps
-from codesign_bench.learning.explorer import Trial
+from codesign_bench.learning.explorer import Explorer, FixedDesigns, Trial
 from codesign_bench.learning.ppo import gaussian
 from codesign_bench.learning.ppo_method import PPOMethod
 from codesign_bench.learning.trajectories import Trajectories
@@ -27,9 +27,9 @@ MakeLearner = Callable[..., TwoPhaseLearner]
 BUDGET = 10_000
 
 
-def middle(steps: int, slots: int) -> Trial:
-    """Choose the middle of the design space for every slot."""
-    return Trial(np.zeros((slots, 1), np.float32))
+def middle(explorer: Explorer, steps: int, slots: int) -> tuple[Explorer, int]:
+    """Give every slot the middle of the design space."""
+    return FixedDesigns(explorer, Trial(np.zeros((slots, 1), np.float32))), slots
 
 
 def assert_normalized_alike(found: torch.Tensor, values: Floats) -> None:
@@ -58,8 +58,8 @@ def make_constant(network: torch.nn.Module, value: float) -> None:
     [
         ({"design_credit": "joint"}, JointCredit),
         ({"design_credit": "separate"}, SeparateCredit),
-        ({"design_credit": "separate", "choose_trial": middle}, NoCredit),
-        ({"design_credit": "joint", "choose_trial": middle}, NoCredit),
+        ({"design_credit": "separate", "give_designs": middle}, NoCredit),
+        ({"design_credit": "joint", "give_designs": middle}, NoCredit),
     ],
 )
 def test_the_configuration_chooses_the_credit(
@@ -126,7 +126,7 @@ def test_a_control_update_alone_never_stops_the_design_update(name: str, reach: 
 
 
 def test_designs_that_are_given_are_not_learned(make_learner: MakeLearner, recorder: Any) -> None:
-    learner = make_learner(fix_std=False, choose_trial=middle, loop=recorder)
+    learner = make_learner(fix_std=False, give_designs=middle, loop=recorder)
     head = {name: tensor.clone() for name, tensor in learner.actor.named_parameters() if "design" in name}
     _, batch = learner.train(BUDGET)
     for name, tensor in learner.actor.named_parameters():

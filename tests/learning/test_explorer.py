@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from codesign_bench.learning.explorer import Explorer, FixedDesigns, Sample, Trial
+from codesign_bench.learning.explorer import Explorer, FixedDesigns, Sample, Trial, UniformDesigns
 from codesign_bench.learning.rollout import Collector
 from codesign_bench.method import Problem
 from codesign_bench.task import Singles, Slots, Task
@@ -91,3 +91,13 @@ def test_chosen_instances_are_played_in_turn_by_every_slot(collector: Collector)
         assert len(met) > 2
         expected = instances[slot, np.arange(len(met)) % 2, : met.shape[1]]
         np.testing.assert_array_equal(met, expected.astype(np.float32))
+
+
+def test_uniform_designs_fill_the_design_space_evenly(collector: Collector) -> None:
+    batch = collector.collect(UniformDesigns(Loud(1, 0)), 60 * STEPS, SLOTS, np.random.default_rng(0))
+    designs = np.sort(batch.design[batch.is_design & batch.valid][:, 0])
+    assert len(designs) > 200
+    assert -1.0 < designs[0] < designs[-1] < 1.0
+    # Kolmogorov's distance from the uniform distribution; 1.63 / sqrt(n) is exceeded in one of a hundred samples.
+    expected = 2.0 * (np.arange(len(designs)) + 0.5) / len(designs) - 1.0
+    assert np.abs(designs - expected).max() / 2.0 < 1.63 / np.sqrt(len(designs))

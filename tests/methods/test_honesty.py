@@ -1,4 +1,4 @@
-"""Each of the paper's methods is what it says: the baselines' limits are real, and so is their strength.
+"""Each method is what it says: the baselines' limits are real, and so is their strength.
 
 This file names methods; what holds for all of them is in `test_contract.py`.
 """
@@ -6,7 +6,7 @@ This file names methods; what holds for all of them is in `test_contract.py`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,9 @@ import torch
 
 from codesign_bench.config.profiles import profiles
 from codesign_bench.config.resolve import resolve
+from codesign_bench.errors import UserError
 from codesign_bench.learning.actor import Actor
-from codesign_bench.method import Method, load_method
+from codesign_bench.method import Method, Problem, load_method
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Singles, Task, load_task, task_names
 from codesign_bench.task.episodes import Episodes
@@ -88,6 +89,27 @@ def test_the_single_trajectory_is_open_loop(make_method: MakeMethod, push: Task)
     assert plan.size == push.design_space.size + push.horizon * push.control_space.size
     for acted, planned in ((policy.act(seen).ravel(), plan[push.design_space.size :]), (policy.design(seen[0]), plan)):
         np.testing.assert_array_equal(acted, np.float32(planned[: acted.size]))
+
+
+def test_a_given_tool_is_the_one_that_is_used_for_every_goal(push: Task) -> None:
+    given, method_class = (0.25, -0.5, 0.0, 1.0, -1.0), load_method("fixed_tool")
+    config = replace(method_class.config_class(), **method_class.small(), unit_design=given)
+    method = method_class(Problem(push), config, Streams(0))
+    method.train(1_000)
+    for acted in (method.policy().design(starts(push)), method.learner.collect(400, 2).design[:, 0]):
+        np.testing.assert_array_equal(acted, np.float32(given) * np.ones((len(acted), 1), np.float32))
+    with pytest.raises(UserError, match=r"unit_design has 2 numbers; the tools of 'push' have 5"):
+        method_class(Problem(push), replace(config, unit_design=(0.0, 0.0)), Streams(0))
+
+
+def test_random_tools_are_drawn_anew_in_every_episode_and_the_middle_one_is_used(push: Task) -> None:
+    method_class = load_method("random_tool")
+    method = method_class(Problem(push), replace(method_class.config_class(), **method_class.small()), Streams(0))
+    batch = method.learner.collect(2_000, 4)
+    designs = batch.design[batch.is_design & batch.valid]
+    assert len(np.unique(designs, axis=0)) == len(designs) > 8
+    assert (np.abs(designs) <= 1.0).all()
+    np.testing.assert_array_equal(method.policy().design(starts(push)), 0.0)
 
 
 @pytest.mark.parametrize("name", PPO_BASED)

@@ -1,0 +1,70 @@
+"""What control alone can do: PPO control with one given tool, which nothing changes (ours).
+
+A method that designs is worth its design only where it ends above this one, with the same budget for control.
+
+Shapes: `S` slots, `D` design.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, TypeAlias
+
+import numpy as np
+
+from codesign_bench.config.settings import Settings
+from codesign_bench.config.values import Length, Within
+from codesign_bench.errors import UserError
+from codesign_bench.learning.explorer import Explorer, FixedDesigns, Trial
+from codesign_bench.learning.ppo_config import PerceptronConfig
+from codesign_bench.method import Problem
+from codesign_bench.seeding import Streams
+
+from ._given_design import WITHOUT_EFFECT, GivenDesignMethod
+from ._settings import SMALL_PERCEPTRONS, SMALL_PPO, ppo_settings
+
+UnitParameter: TypeAlias = Annotated[float, Within(-1.0, 1.0)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Config(PerceptronConfig):
+    """Hyperparameters of `fixed_tool`: PPO's and the perceptrons', and the tool."""
+
+    not_searched: ClassVar = (*WITHOUT_EFFECT, "unit_design")
+    """The tool is given."""
+    unit_design: Annotated[tuple[UnitParameter, ...], Length(0, 64)] = ()
+    """The tool, each parameter from -1 to 1 over its range; none: the middle of the design space."""
+
+
+class FixedTool(GivenDesignMethod[Config]):
+    """One given tool for all goals, and PPO for its control."""
+
+    name = "fixed_tool"
+    label = "fixed tool"
+    config_class = Config
+
+    def __init__(self, problem: Problem, config: Config, streams: Streams) -> None:
+        super().__init__(problem, config, streams)
+        size = problem.task.design_space.size
+        if len(config.unit_design) not in (0, size):
+            raise UserError(
+                f"unit_design has {len(config.unit_design)} numbers; the tools of '{problem.task.name}' have {size}"
+            )
+        if config.unit_design:
+            self.actor.act_with(np.array(config.unit_design))
+
+    @classmethod
+    def small(cls) -> Mapping[str, Any]:
+        """Return batches of a few episodes and small networks."""
+        return {**SMALL_PPO, **SMALL_PERCEPTRONS}
+
+    @classmethod
+    def profile(cls, profile: str, task_name: str) -> Settings:
+        """Return PPO's settings."""
+        return ppo_settings(profile, task_name)
+
+    def give_designs(self, explorer: Explorer, steps: int, slots: int) -> tuple[Explorer, int]:
+        """Give every slot the tool."""
+        designs = self.actor.best_design.numpy()[None].repeat(slots, axis=0)
+        return FixedDesigns(explorer, Trial(designs)), slots

@@ -75,10 +75,12 @@ class GivenDesignMethod(Method[ConfigType]):
     """PPO for a design-conditioned controller; subclasses choose the designs that it is trained with."""
 
     config_class: ClassVar[type] = PerceptronConfig
+    actor_class: ClassVar[type[GivenDesignActor]] = GivenDesignActor
+    actor: GivenDesignActor
 
     def __init__(self, problem: Problem, config: ConfigType, streams: Streams) -> None:
         super().__init__(problem, config, streams)
-        self.actor = GivenDesignActor(problem.task, config, streams["policy weights"])
+        self.actor = self.actor_class(problem.task, config, streams["policy weights"])
         value = MLPValue(problem.task, config.value_net, streams["value weights"])
         self.learner = TwoPhaseLearner(problem, config, streams, self.actor, value, self.give_designs)
 
@@ -105,7 +107,7 @@ class GivenDesignMethod(Method[ConfigType]):
     @classmethod
     def make_policy(cls, task: Task, config: ConfigType, tensors: Mapping[str, Any]) -> Policy:
         """Return the design and the controller with the given parameters."""
-        actor = GivenDesignActor(task, config, np.random.default_rng(0))
+        actor = cls.actor_class(task, config, np.random.default_rng(0))
         load_module_arrays(actor, tensors)
         return ActorPolicy(actor)
 

@@ -102,6 +102,19 @@ def test_a_given_tool_is_the_one_that_is_used_for_every_goal(push: Task) -> None
         method_class(Problem(push), replace(config, unit_design=(0.0, 0.0)), Streams(0))
 
 
+def test_contextual_cma_gives_every_goal_its_tool(make_method: MakeMethod, push: Task) -> None:
+    method: Any = trained(make_method, "contextual_cma")
+    while method.search.generations < 2:
+        method.train(BUDGET)
+    designs = method.policy().design(starts(push))
+    assert len(np.unique(designs, axis=0)) == len(designs)
+    batch = method.learner.collect(2_000, 4)
+    begun = batch.is_design & batch.valid
+    away = batch.design[begun] - method.policy().design(batch.observation[begun])
+    # Drawn around the means with the deviation of the search: four of them are hardly ever exceeded.
+    assert 0.0 < np.abs(away).max() < 4.0 * method.search.sigma * np.sqrt(np.diag(method.search.covariance)).max()
+
+
 def test_random_tools_are_drawn_anew_in_every_episode_and_the_middle_one_is_used(push: Task) -> None:
     method_class = load_method("random_tool")
     method = method_class(Problem(push), replace(method_class.config_class(), **method_class.small()), Streams(0))

@@ -115,6 +115,31 @@ def test_contextual_cma_gives_every_goal_its_tool(make_method: MakeMethod, push:
     assert 0.0 < np.abs(away).max() < 4.0 * method.search.sigma * np.sqrt(np.diag(method.search.covariance)).max()
 
 
+def test_a_climbed_design_is_liked_better_by_the_critic_than_those_it_started_from(
+    make_method: MakeMethod, push: Task
+) -> None:
+    policy: Any = trained(make_method, "critic_design").policy()
+    goals = starts(push)
+    designs = policy.design(goals)
+    assert len(np.unique(designs, axis=0)) > 1
+    for observation, design in zip(torch.from_numpy(goals), torch.from_numpy(designs), strict=True):
+        with torch.no_grad():
+            assert policy.values(observation, design[None]) > policy.values(observation, policy.starts()).max()
+
+
+def test_the_critic_is_asked_for_the_state_after_the_design_step(make_method: MakeMethod, push: Task) -> None:
+    policy: Any = trained(make_method, "critic_design").policy()
+    episodes, given = Episodes(push, 1), np.linspace(-0.8, 0.8, push.design_space.size, dtype=np.float32)
+    episodes.begin(np.arange(1), push.sample_instances(np.random.default_rng(1), 1))
+    before = torch.from_numpy(episodes.observation[0].copy())
+    episodes.design(np.arange(1), given[None])
+    with torch.no_grad():
+        expected = policy.value(torch.from_numpy(episodes.observation.astype(np.float32)))
+        found = policy.values(before.float(), torch.from_numpy(given)[None])
+    # All that changes besides is where the tool is held so that it is clear of the puck.
+    assert float(found) == pytest.approx(float(expected), abs=0.2)
+
+
 def test_random_tools_are_drawn_anew_in_every_episode_and_the_middle_one_is_used(push: Task) -> None:
     method_class = load_method("random_tool")
     method = method_class(Problem(push), replace(method_class.config_class(), **method_class.small()), Streams(0))

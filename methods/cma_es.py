@@ -18,9 +18,9 @@ from codesign_bench.config.values import Within
 from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, fitness_metrics
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
-from codesign_bench.task import Booleans, Floats, Singles, Task
-from codesign_bench.task.episodes import portions
+from codesign_bench.task import Floats, Singles, Task
 
+from ._open_loop import controls_of, designs_of, plan_size, play, step_of
 from ._settings import Tuned, tuned
 
 PLAN = "plan"
@@ -44,11 +44,10 @@ class OpenLoopPolicy(Policy):
     """One design and one control per time step; only the elapsed time is read from the observation."""
 
     def __init__(self, task: Task, plan: Floats) -> None:
-        size = task.design_space.size
         self.task = task
         self.plan = np.asarray(plan, dtype=np.float64)
-        self.designs: Singles = self.plan[:size].astype(np.float32)
-        self.controls: Singles = self.plan[size:].reshape(task.horizon, task.control_space.size).astype(np.float32)
+        self.designs: Singles = designs_of(task, self.plan).astype(np.float32)
+        self.controls: Singles = controls_of(task, self.plan).astype(np.float32)
 
     def design(self, observation: Singles) -> Singles:
         """Return the design, the same for every observation."""
@@ -56,10 +55,7 @@ class OpenLoopPolicy(Policy):
 
     def act(self, observation: Singles) -> Singles:
         """Return the control for the elapsed time in the observation."""
-        elapsed = np.asarray(observation)[..., self.task.layout.phase.stop - 1]
-        # The elapsed fraction is stored in single precision, so it is rounded to the nearest step, not down.
-        step = np.minimum(np.rint(elapsed * self.task.horizon).astype(int), self.task.horizon - 1)
-        controls: Singles = self.controls[step]
+        controls: Singles = self.controls[step_of(self.task, observation)]
         return controls
 
     def tensors(self) -> dict[str, Any]:
@@ -76,9 +72,7 @@ class CmaEs(Method[Config]):
 
     def __init__(self, problem: Problem, config: Config, streams: Streams) -> None:
         super().__init__(problem, config, streams)
-        task = problem.task
-        size = task.design_space.size + task.horizon * task.control_space.size
-        self.evolution = Evolution(size, config, streams["plans"])
+        self.evolution = Evolution(plan_size(problem.task), config, streams["plans"])
 
     @classmethod
     def small(cls) -> Mapping[str, Any]:
@@ -123,30 +117,8 @@ class CmaEs(Method[Config]):
         """Return returns (P, instances), simulated steps and success rate of all plans (P, X) on all instances."""
         count, repeats = len(plans), len(instances)
         owner, instance = np.repeat(np.arange(count), repeats), np.tile(np.arange(repeats), count)
-        parts = [
-            self._play_each(plans[owner[part]], instances[instance[part]])
-            for part in portions(len(owner), self.problem.task)
-        ]
-        returns, steps, solved = (np.concatenate(values) for values in zip(*parts, strict=True))
-        return returns.reshape(count, repeats), int(steps.sum()), float(solved.mean())
-
-    def _play_each(self, plans: Floats, instances: Floats) -> tuple[Floats, Floats, Booleans]:
-        """Return returns, simulated steps and successes, (b,) each, of plans (b, X) on one instance (b, I) each."""
-        task, slots = self.problem.task, np.arange(len(plans))
-        size = task.design_space.size
-        controls = plans[:, size:].reshape(len(slots), task.horizon, task.control_space.size)
-        returns, steps, active = np.zeros(len(slots)), np.ones(len(slots)), slots
-        with self.problem.episodes(len(slots)) as episodes:
-            episodes.begin(slots, instances)
-            episodes.design(slots, plans[:, :size])
-            for step in range(task.horizon):
-                reward, terminated, truncated = episodes.control(active, controls[active, step])
-                returns[active] += reward
-                steps[active] += 1.0
-                active = active[~(terminated | truncated)]
-                if not active.size:
-                    break
-            return returns, steps, episodes.success(slots).copy()
+        played = play(self.problem, plans[owner], instances[instance])
+        return played.returns.reshape(count, repeats), int(played.steps.sum()), float(played.solved.mean())
 
     def policy(self) -> Policy:
         """Return the mean of CMA-ES as a policy."""

@@ -39,6 +39,7 @@ TESTED_ELSEWHERE = {
     "codesign_bench/studies/corl2023/real_robot.py": f"{PRINTED}; tests/studies/corl2023/test_scenes.py",
     "codesign_bench/task/behaviour.py": "an interface; tests/task/test_behaviours.py and tests/task/test_play.py",
     "codesign_bench/task/tool.py": "data alone; tests/tasks/test_contract.py asks what every task makes of it",
+    "methods/_open_loop.py": f"{EVERY_METHOD}, two of which use it",
     "methods/_given_design.py": f"{EVERY_METHOD}, some of which extend it",
     "methods/cma_es.py": EVERY_METHOD,
     "methods/cma_rl.py": EVERY_METHOD,

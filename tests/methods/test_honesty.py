@@ -140,6 +140,31 @@ def test_the_critic_is_asked_for_the_state_after_the_design_step(make_method: Ma
     assert float(found) == pytest.approx(float(expected), abs=0.2)
 
 
+def test_an_archive_holds_the_best_plan_of_every_cell(push: Task) -> None:
+    method_class = load_method("pt_me")
+    method: Any = method_class(Problem(push), replace(method_class.config_class(), **method_class.small()), Streams(0))
+    before = method.archive.returns.copy()
+    for _ in range(30):
+        report = method.train(100_000)
+        assert (method.archive.returns >= before).all()
+        assert 4 * 2 <= report.env_steps <= 4 * (push.horizon + 1)
+        before = method.archive.returns.copy()
+    archive, policy = method.archive, method.policy()
+    assert archive.filled.all()
+    # Played again on its own instance, an elite gets its return again: the policy finds its design and its controls.
+    episodes, slots = Episodes(push, len(archive.returns)), np.arange(len(archive.returns))
+    box = push.instance_space
+    low, high = np.array(box.low), np.array(box.high)
+    episodes.begin(slots, 0.5 * (low + high) + archive.instances * 0.5 * (high - low))
+    episodes.design(slots, policy.design(episodes.observation))
+    returns, active = np.zeros(len(slots)), slots
+    while active.size:
+        reward, terminated, truncated = episodes.control(active, policy.act(episodes.observation[active]))
+        returns[active] += reward
+        active = active[~(terminated | truncated)]
+    np.testing.assert_allclose(returns, archive.returns, atol=1e-3)
+
+
 def test_random_tools_are_drawn_anew_in_every_episode_and_the_middle_one_is_used(push: Task) -> None:
     method_class = load_method("random_tool")
     method = method_class(Problem(push), replace(method_class.config_class(), **method_class.small()), Streams(0))

@@ -127,7 +127,7 @@ def test_a_built_in_member_has_the_shared_files_and_nothing_of_the_core() -> Non
         f"codesign_bench.tasks.{name}" for name in ("push", "_planar", "_scene")
     }
     assert names("codesign_bench.methods.cma_es") == {
-        f"codesign_bench.methods.{name}" for name in ("cma_es", "_settings")
+        f"codesign_bench.methods.{name}" for name in ("cma_es", "_open_loop", "_settings")
     }
 
 

@@ -5,7 +5,6 @@ Shapes: `B` batch, `O` observation, `D` design, `C` control.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar, TypeVar
 
@@ -13,17 +12,21 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from codesign_bench.config.settings import Settings
 from codesign_bench.learning.actor import Actor, ActorPolicy
 from codesign_bench.learning.checkpointing import load_module_arrays
-from codesign_bench.learning.explorer import Explorer
+from codesign_bench.learning.explorer import Explorer, UniformDesigns
 from codesign_bench.learning.features import Features
 from codesign_bench.learning.networks import MLP, RunningNorm, torch_generator
 from codesign_bench.learning.ppo_config import PerceptronConfig
+from codesign_bench.learning.ppo_method import TwoPhaseMethod
 from codesign_bench.learning.two_phase import TwoPhaseLearner
 from codesign_bench.learning.value_networks import MLPValue
-from codesign_bench.method import BatchReport, Method, Policy, Problem, State
+from codesign_bench.method import Policy, Problem
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Floats, Task
+
+from ._settings import SMALL_PERCEPTRONS, SMALL_PPO, ppo_settings
 
 ConfigType = TypeVar("ConfigType", bound=PerceptronConfig)
 WITHOUT_EFFECT = ("design_log_std", "design_learning_rate", "design_epochs", "design_kl_threshold")
@@ -71,8 +74,8 @@ class GivenDesignActor(Actor):
         self.norm.update(self.features.task(observation[~is_design]))
 
 
-class GivenDesignMethod(Method[ConfigType]):
-    """PPO for a design-conditioned controller; subclasses choose the designs that it is trained with."""
+class GivenDesignMethod(TwoPhaseMethod[ConfigType]):
+    """PPO for a design-conditioned controller; a subclass may choose the designs that it is trained with."""
 
     config_class: ClassVar[type] = PerceptronConfig
     actor_class: ClassVar[type[GivenDesignActor]] = GivenDesignActor
@@ -84,25 +87,22 @@ class GivenDesignMethod(Method[ConfigType]):
         value = MLPValue(problem.task, config.value_net, streams["value weights"])
         self.learner = TwoPhaseLearner(problem, config, streams, self.actor, value, self.give_designs)
 
-    @abstractmethod
+    @classmethod
+    def small(cls) -> Mapping[str, Any]:
+        """Return batches of a few episodes and small networks."""
+        return {**SMALL_PPO, **SMALL_PERCEPTRONS}
+
+    @classmethod
+    def profile(cls, profile: str, task_name: str) -> Settings:
+        """Return PPO's settings."""
+        return ppo_settings(profile, task_name)
+
     def give_designs(self, explorer: Explorer, steps: int, slots: int) -> tuple[Explorer, int]:
-        """Return an explorer with the designs of the batch to come, and its number of slots; see `GiveDesigns`."""
+        """Return an explorer with the designs of the batch to come, and its number of slots; see `GiveDesigns`.
 
-    def use_cores(self, count: int) -> None:
-        """Use up to `count` cores."""
-        self.learner.use_cores(count)
-
-    def use_device(self, name: str) -> None:
-        """Update the networks on the device `name`."""
-        self.learner.use_device(name)
-
-    def train(self, remaining_steps: int) -> BatchReport:
-        """Play a batch and update the controller on it."""
-        return self.learner.train(remaining_steps)[0]
-
-    def policy(self) -> Policy:
-        """Return the design to act with and the mean of the controller."""
-        return self.learner.policy()
+        By default every episode draws its design uniformly.
+        """
+        return UniformDesigns(explorer), slots
 
     @classmethod
     def make_policy(cls, task: Task, config: ConfigType, tensors: Mapping[str, Any]) -> Policy:
@@ -110,11 +110,3 @@ class GivenDesignMethod(Method[ConfigType]):
         actor = cls.actor_class(task, config, np.random.default_rng(0))
         load_module_arrays(actor, tensors)
         return ActorPolicy(actor)
-
-    def state(self) -> State:
-        """Return the learner's state."""
-        return self.learner.state()
-
-    def load_state(self, state: State) -> None:
-        """Restore the learner's state."""
-        self.learner.load_state(state)

@@ -24,7 +24,7 @@ from codesign_bench.seeding import Streams
 from codesign_bench.task import Floats
 
 from ._given_design import WITHOUT_EFFECT, GivenDesignMethod
-from ._settings import SMALL_PERCEPTRONS, SMALL_PPO, Tuned, ppo_settings, tuned
+from ._settings import Tuned, tuned
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,12 +53,12 @@ class CmaRl(GivenDesignMethod[Config]):
     @classmethod
     def small(cls) -> Mapping[str, Any]:
         """Return batches of a few episodes and small networks."""
-        return {**SMALL_PPO, **SMALL_PERCEPTRONS, "popsize": 4}
+        return {**super().small(), "popsize": 4}
 
     @classmethod
     def profile(cls, profile: str, task_name: str) -> Settings:
         """Return PPO's settings, with those tuned for this baseline."""
-        return {**ppo_settings(profile, task_name), **tuned(profile, TUNED)}
+        return {**super().profile(profile, task_name), **tuned(profile, TUNED)}
 
     def give_designs(self, explorer: Explorer, steps: int, slots: int) -> tuple[Explorer, int]:
         """Give slot after slot the candidates of this generation in turn, in whole rounds of the generation.

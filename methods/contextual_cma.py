@@ -9,7 +9,6 @@ Shapes: `b` slots, `B` batch, `O` observation, `D` design, `Z` noise, `n` episod
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
@@ -18,9 +17,8 @@ import torch
 from torch import Tensor
 
 from codesign_bench.config.search import Integer, LogUniform
-from codesign_bench.config.settings import Settings
 from codesign_bench.config.values import Within
-from codesign_bench.learning.contextual_cma import ContextFeatures, Distribution
+from codesign_bench.learning.contextual_cma import ContextFeatures, Distribution, mean_of
 from codesign_bench.learning.explorer import Explorer, Sample
 from codesign_bench.learning.ppo_config import PerceptronConfig
 from codesign_bench.method import BatchReport, Problem, State
@@ -28,7 +26,6 @@ from codesign_bench.seeding import Streams
 from codesign_bench.task import Floats, Singles, Slots, Task
 
 from ._given_design import WITHOUT_EFFECT, GivenDesignActor, GivenDesignMethod
-from ._settings import SMALL_PERCEPTRONS, SMALL_PPO, Tuned, ppo_settings, tuned
 
 SEARCH = "search."
 """Prefix of the distribution's arrays in the state."""
@@ -48,10 +45,6 @@ class Config(PerceptronConfig):
     """Episodes of a generation for each feature that varies: a regression on fewer follows their noise."""
 
 
-TUNED: Tuned = {"laptop": {}, "quick": {}}
-"""Settings tuned for this method (ours)."""
-
-
 class ContextualActor(GivenDesignActor):
     """A design that is a function of the features of state and goal, and a perceptron that controls any design."""
 
@@ -69,8 +62,8 @@ class ContextualActor(GivenDesignActor):
 
     def design(self, observation: Tensor) -> tuple[Tensor, Tensor]:
         """Return the mean design (B, D) for observations (B, O), with standard deviation 0."""
-        mean = self.context(observation.numpy()) @ self.weights.numpy()
-        return torch.from_numpy(np.clip(mean, -1.0, 1.0).astype(np.float32)), self.design_log_std
+        mean = mean_of(self.context(observation.numpy()), self.weights.numpy())
+        return torch.from_numpy(mean.astype(np.float32)), self.design_log_std
 
 
 class AroundTheMean(Explorer):
@@ -110,16 +103,6 @@ class ContextualCma(GivenDesignMethod[Config]):
         sizes = {"features": (0, self.actor.of_context.size), "designs": (0, self.search.path.size), "returns": (0,)}
         return {name: np.zeros(shape) for name, shape in sizes.items()}
 
-    @classmethod
-    def small(cls) -> Mapping[str, Any]:
-        """Return batches of a few episodes and small networks."""
-        return {**SMALL_PPO, **SMALL_PERCEPTRONS}
-
-    @classmethod
-    def profile(cls, profile: str, task_name: str) -> Settings:
-        """Return PPO's settings, with those tuned for this method."""
-        return {**ppo_settings(profile, task_name), **tuned(profile, TUNED)}
-
     def give_designs(self, explorer: Explorer, steps: int, slots: int) -> tuple[Explorer, int]:
         """Draw a design for every episode."""
         return AroundTheMean(explorer, self.actor, self.search), slots
@@ -148,9 +131,9 @@ class ContextualCma(GivenDesignMethod[Config]):
         return float(self.search.sigma * np.sqrt(np.diag(self.search.covariance)).mean())
 
     def state(self) -> State:
-        """Return the learner's state, the search distribution, and the generation's episodes so far."""
+        """Return the learner's state, the rest of the search distribution, and the generation's episodes so far."""
         state, search = super().state(), self.search
-        arrays = {SEARCH + name: getattr(search, name) for name in ("weights", "covariance", "path", "sigma_path")}
+        arrays = {SEARCH + name: getattr(search, name) for name in ("covariance", "path", "sigma_path")}
         gathered = {GATHERED + name: values for name, values in self._gathered.items()}
         numbers = {"sigma": search.sigma, "generations": search.generations}
         return State({**state.arrays, **arrays, **gathered}, state.values | numbers)
@@ -160,8 +143,11 @@ class ContextualCma(GivenDesignMethod[Config]):
         rest, values = dict(state.arrays), dict(state.values)
         self._gathered = _taken(rest, GATHERED)
         sigma, generations = float(values.pop("sigma")), int(values.pop("generations"))
-        self.search = Distribution(**_taken(rest, SEARCH), sigma=sigma, generations=generations)
+        paths = _taken(rest, SEARCH)
         super().load_state(State(rest, values))
+        # The actor has the weights of the mean: it acts with them.
+        weights = self.actor.weights.numpy().copy()
+        self.search = Distribution(weights, sigma=sigma, generations=generations, **paths)
 
 
 def _taken(arrays: dict[str, Any], prefix: str) -> dict[str, Floats]:

@@ -18,18 +18,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from codesign_bench.config.settings import Settings
 from codesign_bench.config.values import Within
 from codesign_bench.learning.actor import ActorPolicy
 from codesign_bench.learning.checkpointing import load_module_arrays, module_arrays
-from codesign_bench.learning.explorer import Explorer, UniformDesigns
 from codesign_bench.learning.ppo_config import PerceptronConfig
 from codesign_bench.learning.value_networks import MLPValue, ValueNetwork
 from codesign_bench.method import Array, Policy
 from codesign_bench.task import Singles, Task
 
 from ._given_design import WITHOUT_EFFECT, GivenDesignActor, GivenDesignMethod
-from ._settings import SMALL_PERCEPTRONS, SMALL_PPO, ppo_settings
 
 CRITIC = "critic."
 """Prefix of the value network's arrays in a policy."""
@@ -111,16 +108,7 @@ class CriticDesign(GivenDesignMethod[Config]):
     @classmethod
     def small(cls) -> Mapping[str, Any]:
         """Return batches of a few episodes, small networks, and a short climb."""
-        return {**SMALL_PPO, **SMALL_PERCEPTRONS, "climb_starts": 3, "climb_steps": 5}
-
-    @classmethod
-    def profile(cls, profile: str, task_name: str) -> Settings:
-        """Return PPO's settings."""
-        return ppo_settings(profile, task_name)
-
-    def give_designs(self, explorer: Explorer, steps: int, slots: int) -> tuple[Explorer, int]:
-        """Let every episode draw its design."""
-        return UniformDesigns(explorer), slots
+        return {**super().small(), "climb_starts": 3, "climb_steps": 5}
 
     def policy(self) -> Policy:
         """Return the controller with the critic that chooses its tools."""

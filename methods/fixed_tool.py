@@ -7,22 +7,20 @@ Shapes: `S` slots, `D` design.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, TypeAlias
+from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
 
-from codesign_bench.config.settings import Settings
 from codesign_bench.config.values import Length, Within
 from codesign_bench.errors import UserError
 from codesign_bench.learning.explorer import Explorer, FixedDesigns, Trial
 from codesign_bench.learning.ppo_config import PerceptronConfig
 from codesign_bench.method import Problem
 from codesign_bench.seeding import Streams
+from codesign_bench.task import load_task
 
 from ._given_design import WITHOUT_EFFECT, GivenDesignMethod
-from ._settings import SMALL_PERCEPTRONS, SMALL_PPO, ppo_settings
 
 UnitParameter: TypeAlias = Annotated[float, Within(-1.0, 1.0)]
 
@@ -46,23 +44,19 @@ class FixedTool(GivenDesignMethod[Config]):
 
     def __init__(self, problem: Problem, config: Config, streams: Streams) -> None:
         super().__init__(problem, config, streams)
-        size = problem.task.design_space.size
-        if len(config.unit_design) not in (0, size):
-            raise UserError(
-                f"unit_design has {len(config.unit_design)} numbers; the tools of '{problem.task.name}' have {size}"
-            )
         if config.unit_design:
             self.actor.act_with(np.array(config.unit_design))
 
     @classmethod
-    def small(cls) -> Mapping[str, Any]:
-        """Return batches of a few episodes and small networks."""
-        return {**SMALL_PPO, **SMALL_PERCEPTRONS}
+    def check(cls, config: Config, task_name: str) -> None:
+        """Check that the tool is one of the task's.
 
-    @classmethod
-    def profile(cls, profile: str, task_name: str) -> Settings:
-        """Return PPO's settings."""
-        return ppo_settings(profile, task_name)
+        Raises:
+            UserError: it has another number of parameters.
+        """
+        given, size = len(config.unit_design), load_task(task_name).design_space.size
+        if given not in (0, size):
+            raise UserError(f"unit_design has {given} numbers; the tools of '{task_name}' have {size}")
 
     def give_designs(self, explorer: Explorer, steps: int, slots: int) -> tuple[Explorer, int]:
         """Give every slot the tool."""

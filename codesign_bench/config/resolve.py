@@ -68,7 +68,8 @@ def resolve(
         variant_overrides: the overrides of the cell's variant, in the same form.
 
     Raises:
-        UserError: an unknown task or profile, a value of the wrong type or out of range.
+        UserError: an unknown task or profile, a value of the wrong type or out of range, or one that does not fit the
+            task.
     """
     chosen = profile_named(profile)
     of_task = sourced(load_task(task_name).run_settings.get(profile, {}), f"tuned for {task_name} (ours)")
@@ -94,9 +95,11 @@ def resolve(
             run_values[key], run_sources[key] = _parse_field(RunSettings, key, text), source
         elif prefix in (None, method_class.name) and key in method_values:
             method_values[key], method_sources[key] = _parse_field(method_class.config_class, key, text), source
+    method = _build(method_class.config_class, method_values)
+    method_class.check(method, task_name)
     return ResolvedConfig(
         run=_build(RunSettings, run_values),
-        method=_build(method_class.config_class, method_values),
+        method=method,
         sources={
             **{f"{RUN}.{name}": source for name, source in run_sources.items()},
             **{f"{METHOD}.{name}": source for name, source in method_sources.items()},

@@ -64,7 +64,7 @@ class Distribution:
 
     def mean(self, features: Floats) -> Floats:
         """Return the mean (n, D) for features (n, f), inside [-1, 1]."""
-        return np.clip(features @ self.weights, -1.0, 1.0)
+        return mean_of(features, self.weights)
 
     def root(self) -> Floats:
         """Return the lower triangle (D, D) that turns standard-normal noise into deviations from the mean."""
@@ -105,6 +105,11 @@ class Distribution:
         self.covariance = kept * self.covariance + one_rate * np.outer(self.path, self.path) + mu_rate * spread
         self.covariance = 0.5 * (self.covariance + self.covariance.T)
         self.sigma *= float(np.exp(sigma_rate / damping * (length / usual - 1.0)))
+
+
+def mean_of(features: Floats, weights: Floats) -> Floats:
+    """Return the mean (n, D) that weights (f, D) give for features (n, f), inside [-1, 1]."""
+    return np.clip(features @ weights, -1.0, 1.0)
 
 
 def selection_weights(features: Floats, returns: Floats) -> Floats:

@@ -5,8 +5,8 @@ Shapes: `n` valid steps of a batch, `N` rows of the buffers, `k` minibatches, `w
 
 The steps are those of `UpdateLoop` up to rounding. Three things differ in form. A minibatch is padded: each phase has a
 fixed number of places, and those without a row have weight 0 in every mean. Which minibatch is next is a counter on the
-device. And the policy's KL stop is a number there, too: once it is 0, Adam is told to skip its steps, as after an
-overflow in reduced precision; the processor reads it once an epoch.
+device. And the policy's KL stop is a number there, too: once it is 0, Adam skips its steps, as after an overflow in
+reduced precision; the processor reads it once an epoch.
 """
 
 from __future__ import annotations
@@ -233,7 +233,7 @@ class FixedPolicyUpdate:
         self._running.mul_(~(divergence > self.loss.kl_threshold))
         self._taken.add_(self._running)
         # As torch's gradient scaler says that a step overflowed: a fused optimizer skips it, with moments and count.
-        self.optimizer.found_inf = 1.0 - self._running  # type: ignore[attr-defined]
+        self.optimizer.found_inf = 1.0 - self._running  # type: ignore[attr-defined]  # torch's scaler sets it, too
         gradient_step(loss, self.optimizer, self.parameters, self.loss.max_gradient_norm)
 
 

@@ -1,4 +1,4 @@
-"""Base class of methods with a two-phase PPO learner; subclasses define the networks."""
+"""Base classes of methods with a two-phase PPO learner; subclasses of `PPOMethod` define only the networks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,37 @@ from codesign_bench.task import Task
 ConfigType = TypeVar("ConfigType", bound=PPOConfig)
 
 
-class PPOMethod(Method[ConfigType]):
+class TwoPhaseMethod(Method[ConfigType]):
+    """A method that trains a two-phase learner; subclasses make the learner."""
+
+    learner: TwoPhaseLearner
+
+    def use_cores(self, count: int) -> None:
+        """Use up to `count` cores."""
+        self.learner.use_cores(count)
+
+    def use_device(self, name: str) -> None:
+        """Update the networks on the device `name`."""
+        self.learner.use_device(name)
+
+    def train(self, remaining_steps: int) -> BatchReport:
+        """Collect one batch of whole episodes and update all networks on it."""
+        return self.learner.train(remaining_steps)[0]
+
+    def policy(self) -> Policy:
+        """Return the actor acting with its means."""
+        return self.learner.policy()
+
+    def state(self) -> State:
+        """Return the learner's state."""
+        return self.learner.state()
+
+    def load_state(self, state: State) -> None:
+        """Restore the learner's state."""
+        self.learner.load_state(state)
+
+
+class PPOMethod(TwoPhaseMethod[ConfigType]):
     """A PPO-based method without its networks."""
 
     config_class: ClassVar[type] = PPOConfig
@@ -41,25 +71,9 @@ class PPOMethod(Method[ConfigType]):
     def make_value(cls, task: Task, config: ConfigType, rng: np.random.Generator) -> ValueNetwork:
         """Return a new value network with weights from `rng`."""
 
-    def use_cores(self, count: int) -> None:
-        """Use up to `count` cores."""
-        self.learner.use_cores(count)
-
-    def use_device(self, name: str) -> None:
-        """Update the networks on the device `name`."""
-        self.learner.use_device(name)
-
     def start_from(self, tensors: Mapping[str, Any]) -> None:
         """Start from a trained designer and controller with new value networks."""
         load_module_arrays(self.learner.actor, tensors)
-
-    def train(self, remaining_steps: int) -> BatchReport:
-        """Collect one batch of whole episodes and update all networks on it."""
-        return self.learner.train(remaining_steps)[0]
-
-    def policy(self) -> Policy:
-        """Return the actor acting with its means."""
-        return self.learner.policy()
 
     @classmethod
     def make_policy(cls, task: Task, config: ConfigType, tensors: Mapping[str, Any]) -> Policy:
@@ -67,11 +81,3 @@ class PPOMethod(Method[ConfigType]):
         actor = cls.make_actor(task, config, np.random.default_rng(0))
         load_module_arrays(actor, tensors)
         return ActorPolicy(actor)
-
-    def state(self) -> State:
-        """Return the learner's state."""
-        return self.learner.state()
-
-    def load_state(self, state: State) -> None:
-        """Restore the learner's state."""
-        self.learner.load_state(state)

@@ -95,6 +95,14 @@ class Method(ABC, Generic[ConfigType]):
         return {}
 
     @classmethod
+    def check(cls, config: ConfigType, task_name: str) -> None:
+        """Check that complete settings fit a task, before any cell runs with them; by default nothing.
+
+        Raises:
+            UserError: they do not.
+        """
+
+    @classmethod
     def small(cls) -> Mapping[str, Any]:
         """Return settings with which a batch takes a fraction of a second, for tests; by default none."""
         return {}

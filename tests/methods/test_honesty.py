@@ -99,7 +99,7 @@ def test_a_given_tool_is_the_one_that_is_used_for_every_goal(push: Task) -> None
     for acted in (method.policy().design(starts(push)), method.learner.collect(400, 2).design[:, 0]):
         np.testing.assert_array_equal(acted, np.float32(given) * np.ones((len(acted), 1), np.float32))
     with pytest.raises(UserError, match=r"unit_design has 2 numbers; the tools of 'push' have 5"):
-        method_class(Problem(push), replace(config, unit_design=(0.0, 0.0)), Streams(0))
+        resolve(method_class, "push", "laptop", ["unit_design=0,0"])
 
 
 def test_contextual_cma_gives_every_goal_its_tool(make_method: MakeMethod, push: Task) -> None:

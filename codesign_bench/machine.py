@@ -33,7 +33,7 @@ LIBRARY_SETTINGS = (
 )
 """Environment variables that make these libraries choose otherwise."""
 CUDA_CONTEXT = 500.0
-"""About what the CUDA context of a process takes on a GPU beside its tensors, MB (ours)."""
+"""What is allowed for the CUDA context of a process on a GPU, beside its tensors, MB (ours; not measured)."""
 BFLOAT16_FLAGS = ("amx_bf16", "avx512_bf16", "bf16")
 """CPU flags that indicate bfloat16 arithmetic: two of x86 (Intel, AMD) and one of ARM."""
 
@@ -97,7 +97,7 @@ def gpu_megabytes() -> float | None:
     torch = sys.modules.get("torch")
     if torch is None or not torch.cuda.is_initialized():
         return None
-    return CUDA_CONTEXT + float(torch.cuda.max_memory_reserved()) / 2**20
+    return round(CUDA_CONTEXT + torch.cuda.max_memory_reserved() / 2**20, 1)
 
 
 def total_gpu_megabytes() -> float | None:
@@ -119,7 +119,7 @@ def peak_megabytes() -> float:
     status = Path("/proc/self/status")
     if status.exists():
         own = int(re.search(r"^VmHWM:\s+(\d+) kB", status.read_text(), re.MULTILINE)[1])  # type: ignore[index]  # Linux always has this line.
-    return (own + resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) / 1024.0
+    return round((own + resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) / 1024.0, 1)
 
 
 def _flags() -> set[str]:

@@ -240,7 +240,7 @@ def _in_process(name: str, work: Workload) -> Speed:
 def _main(name: str, work_json: str) -> None:
     import torch
 
-    np.random.seed(0)  # noqa: NPY002 - the other libraries draw from the global generator
+    np.random.seed(0)  # noqa: NPY002  # the other libraries draw from the global generator
     work = Workload(**json.loads(work_json))
     torch.set_num_threads(int(os.environ["OMP_NUM_THREADS"]))
     print(json.dumps(asdict(contestants()[name].measure(work))))

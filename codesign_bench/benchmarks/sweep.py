@@ -17,7 +17,7 @@ from codesign_bench.code_version import code_version
 from codesign_bench.console import duration, print_table, printer
 from codesign_bench.machine import available_cores, host_facts, package_versions
 from codesign_bench.storage.files import json_bytes, write_output
-from codesign_bench.sweep.pace import Pace, measure
+from codesign_bench.sweep.pace import NotTimed, Pace, measure
 
 HEADER = ("cell", "profile", "at a time", "steps/s each", "steps/s together", "a cell", "cells/hour", "MB each")
 
@@ -94,7 +94,10 @@ def bench_sweep(
         cell = resolved.cell
         at_a_time = jobs or max(1, available_cores() // resolved.config.run.threads)
         say(f"measuring {cell.task}/{cell.method}, profile {cell.profile}, {at_a_time} at a time ...")
-        found.append(project(resolved, measure(resolved, at_a_time)))
+        try:
+            found.append(project(resolved, measure(resolved, at_a_time)))
+        except NotTimed as error:
+            say(f"left out: {error}")
     print_table(console, HEADER, [_row(each) for each in found])
     say(f"on {available_cores()} cores; each cell trained for some seconds and was evaluated once")
     if out is not None:

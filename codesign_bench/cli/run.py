@@ -101,26 +101,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
     resolved = resolve_cells(list(cells) if options.tuned is None else tuned_cells(cells, options.tuned))
     for device in {cell.config.run.device for cell in resolved}:
         check_device(device)
+    settings = {"jobs": options.jobs, "retry_failed": options.retry_failed, "same_code": options.same_code}
     if options.dry_run:
-        return dry_run(
-            resolved,
-            options.out,
-            console=console,
-            jobs=options.jobs,
-            retry_failed=options.retry_failed,
-            same_code=options.same_code,
-        )
+        return dry_run(resolved, options.out, console=console, **settings)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does
-    return run_sweep(
-        resolved,
-        options.out,
-        console=console,
-        jobs=options.jobs,
-        retry_failed=options.retry_failed,
-        backend=options.backend,
-        scheduler=options.scheduler,
-        same_code=options.same_code,
-    )
+    where = {"backend": options.backend, "scheduler": options.scheduler}
+    return run_sweep(resolved, options.out, console=console, **settings, **where)
 
 
 def tuned_cells(cells: Iterable[Cell], path: Path) -> list[Cell]:

@@ -70,8 +70,8 @@ class Estimate:
     def line(self) -> str:
         """Return the time and the memory as one line."""
         if self.unknown == len(self.cells):
-            return "expected time unknown: no cell of these kinds has been timed on this machine (--dry-run does that)"
-        rest = f", and {self.unknown} cells of unknown speed (--dry-run measures it)" if self.unknown else ""
+            return "expected time unknown: no cell of these kinds has been timed here yet (--dry-run times one of each)"
+        rest = f", and {self.unknown} cells of unknown speed (--dry-run times one of each kind)" if self.unknown else ""
         return f"expected to take {duration(self.seconds)}{rest}{self._memory()}"
 
     def _memory(self) -> str:

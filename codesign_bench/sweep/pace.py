@@ -10,12 +10,13 @@ import hashlib
 import json
 import os
 import signal
-import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -31,6 +32,7 @@ from codesign_bench.storage.json_fields import number, optional
 from codesign_bench.storage.reading import UnusableFile, read_json
 from codesign_bench.storage.records import DONE, CellRecord
 from codesign_bench.sweep.cell_process import pin_threads
+from codesign_bench.sweep.workers import describe_exit
 
 Kind: TypeAlias = str
 """A digest of what the speed of a cell depends on, the machine included."""
@@ -69,7 +71,7 @@ def kind_of(resolved: ResolvedCell) -> Kind:
         settings={name: value for name, (value, _) in config.method.items()},
         threads=resolved.config.run.threads,
         device=resolved.config.run.device,
-        host=_machine(host_facts(resolved.config.run.threads)),
+        host=_this_machine(),
     )
 
 
@@ -86,6 +88,12 @@ def kind_of_record(record: CellRecord) -> Kind:
     )
 
 
+@cache
+def _this_machine() -> list[Any]:
+    """Return what `_machine` does of this one; once, since a sweep asks for every cell."""
+    return _machine(host_facts(threads=1))
+
+
 def _machine(host: Mapping[str, Any]) -> list[Any]:
     return [host.get(name) for name in ("name", "cpu", "cores")]
 
@@ -99,19 +107,31 @@ def of_finished(records: Iterable[CellRecord]) -> dict[Kind, Pace]:
     """Return the mean pace of the finished cells of each kind."""
     by_kind: dict[Kind, list[CellRecord]] = {}
     for record in records:
-        times = record.timings
-        if record.status == DONE and times.train_s and times.evaluate_s is not None and record.env_steps:
+        if record.status == DONE and _is_timed(record):
             by_kind.setdefault(kind_of_record(record), []).append(record)
     return {kind: _mean(same) for kind, same in by_kind.items()}
+
+
+def _is_timed(record: CellRecord) -> bool:
+    """Return whether a record has times and counts that a pace follows from: others' files may hold anything."""
+    train_s, evaluate_s = record.timings.train_s, record.timings.evaluate_s
+    if train_s is None or evaluate_s is None:
+        return False
+    return train_s > 0.0 and evaluate_s >= 0.0 and record.env_steps > 0 and _evaluations(record) > 0
+
+
+def _evaluations(record: CellRecord) -> int:
+    """Return how often a finished cell was evaluated, the untrained policy included; 0 if its file does not say."""
+    entry = record.config.run.get("evaluations")
+    return 1 + entry.value if entry is not None and type(entry.value) is int and entry.value > 0 else 0
 
 
 def _mean(records: list[CellRecord]) -> Pace:
     trained = sum(record.timings.train_s or 0.0 for record in records)
     evaluated = sum(record.timings.evaluate_s or 0.0 for record in records)
-    evaluations = sum(1 + int(record.config.run["evaluations"][0]) for record in records)
-    steps = sum(record.env_steps for record in records)
+    steps, evaluations = (sum(map(count, records)) for count in (lambda record: record.env_steps, _evaluations))
     peak_mb, gpu_mb = (
-        max((each for record in records if (each := getattr(record.timings, name)) is not None), default=None)
+        max((each for record in records if (each := getattr(record.timings, name) or 0.0) > 0.0), default=None)
         for name in ("peak_mb", "gpu_mb")
     )
     return Pace(steps / trained, evaluated / evaluations, peak_mb, FINISHED, gpu_mb)
@@ -149,26 +169,33 @@ def remember(paces: Mapping[Kind, Pace]) -> None:
         write_json(path, {kind: asdict(pace) for kind, pace in kept.items()}, durable=False)
 
 
+class NotTimed(Exception):
+    """A cell failed while it was timed; the message is the last line that it wrote."""
+
+
 def measure(resolved: ResolvedCell, at_a_time: int = 1) -> list[Pace]:
     """Train so many equal cells of a kind side by side for some seconds, each in its process; return their paces.
 
     Raises:
-        RuntimeError: a process failed; the message has what it wrote.
+        NotTimed: a process failed.
     """
-    cell = resolved.cell.to_json()
-    processes = [python_process(__name__, cell, stderr=subprocess.STDOUT) for _ in range(at_a_time)]
-    try:
-        # Not `communicate`, which would close the pipe by which they know that this process is alive.
-        outputs = ["" if process.stdout is None else process.stdout.read() for process in processes]
-        codes = [process.wait() for process in processes]
-    finally:
-        for process in processes:
-            if process.poll() is None:
-                process.kill()
-                process.wait()
-    for code, output in zip(codes, outputs, strict=True):
-        if code:
-            raise RuntimeError(f"measuring {resolved.cell.task}/{resolved.cell.method} failed:\n{output}")
+    with ExitStack() as files:
+        logs = [files.enter_context(tempfile.TemporaryFile("w+")) for _ in range(at_a_time)]
+        processes = [python_process(__name__, resolved.cell.to_json(), stderr=log) for log in logs]
+        try:
+            # Not `communicate`, which would close the pipe by which they know that this process is alive.
+            outputs = ["" if process.stdout is None else process.stdout.read() for process in processes]
+            codes = [process.wait() for process in processes]
+        finally:
+            for process in processes:
+                if process.poll() is None:
+                    process.kill()
+                    process.wait()
+        for code, log in zip(codes, logs, strict=True):
+            if code:
+                log.seek(0)
+                lines = log.read().strip().splitlines() or [describe_exit(code)]
+                raise NotTimed(f"{resolved.cell.task}/{resolved.cell.method} cannot be timed: {lines[-1]}")
     return [_pace(json.loads(output.splitlines()[-1])) for output in outputs]
 
 

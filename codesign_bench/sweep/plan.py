@@ -98,10 +98,10 @@ def _set_aside(plan: Plan, cell: Cell, error: UserError) -> None:
 def _problems(cell: Cell, record: CellRecord, out: Path) -> str:
     """Return which files of a finished cell cannot be used, and why; "" if all can."""
     problems = StoredCell(cell.folder(out), record).problems
-    told = [f"{problem.path.name}: {problem.reason}" for problem in problems]
+    reasons = [f"{problem.path.name}: {problem.reason}" for problem in problems]
     if problems and all(isinstance(problem, DamagedFile) for problem in problems):
-        told.append("delete its folder to run it again")
-    return "; ".join(told)
+        reasons.append("delete its folder to run it again")
+    return "; ".join(reasons)
 
 
 def _refuse_other_configurations(

@@ -23,7 +23,7 @@ from codesign_bench.storage.locks import HOLDER_FILE, has_locks, is_locked
 from codesign_bench.storage.records import FAILED, INTERRUPTED
 from codesign_bench.sweep.backends import Backend, ClusterLost, WorkersDied, make_backend
 from codesign_bench.sweep.estimate import estimate, fitting, known_paces, row, untimed
-from codesign_bench.sweep.pace import Kind, Pace, measure, remember
+from codesign_bench.sweep.pace import Kind, NotTimed, Pace, measure, remember
 from codesign_bench.sweep.plan import Plan, make_plan
 from codesign_bench.sweep.progress import ProgressDisplay
 from codesign_bench.sweep.workers import BUSY, Job, Outcome
@@ -129,8 +129,11 @@ def dry_run(
     say, known = printer(console), known_paces(out)
     for kind, pending in untimed(plan.pending, known).items():
         say(f"timing {pending.cell.task}/{pending.cell.method} ...")
-        known[kind] = measure(pending.resolved)[0]
-        remember({kind: known[kind]})
+        try:
+            known[kind] = measure(pending.resolved)[0]
+            remember({kind: known[kind]})
+        except NotTimed as error:
+            say(str(error))
     used_jobs, split = _split(cells, plan, jobs, known)
     expected = estimate(plan.pending, used_jobs, known)
     settled = {
@@ -243,8 +246,8 @@ def _conclude(say: Log, cells: int, trouble: Trouble, plan: Plan) -> int:
     if trouble.interrupted:
         say(f"{len(trouble.interrupted)} of {cells} cells interrupted; the same command resumes them")
     if trouble.failed:
-        told = "cell.json has the traceback of each that began, and --retry-failed runs it again"
-        say(f"{len(trouble.failed)} of {cells} cells failed; {told}")
+        advice = "cell.json has the traceback of each that began, and --retry-failed runs it again"
+        say(f"{len(trouble.failed)} of {cells} cells failed; {advice}")
     if trouble.failed or trouble.interrupted:
         return EXIT_SOME_FAILED
     say(f"all {cells} cells done")

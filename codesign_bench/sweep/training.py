@@ -88,7 +88,7 @@ class CellRun:
             train_s=progress.train_s,
             evaluate_s=progress.evaluate_s,
             wall_s=self._wall_s(),
-            peak_mb=round(peak_megabytes(), 1),
+            peak_mb=peak_megabytes(),
             gpu_mb=gpu_megabytes(),
         )
 

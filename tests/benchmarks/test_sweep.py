@@ -35,7 +35,7 @@ def test_it_measures_and_writes_what_it_found(tmp_path: Path, capsys: pytest.Cap
 
 
 @pytest.mark.parametrize(
-    ("changed", "told"),
+    ("changed", "named"),
     [
         (["--task", "pull"], "unknown task 'pull'"),
         (["--method", "guess"], "unknown method 'guess'"),
@@ -43,6 +43,6 @@ def test_it_measures_and_writes_what_it_found(tmp_path: Path, capsys: pytest.Cap
         (["--jobs", "0"], "--jobs"),
     ],
 )
-def test_what_cannot_be_measured_is_refused(changed: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_cannot_be_measured_is_refused(changed: list[str], named: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", "sweep", "--task", "toy_reach", "--method", "toy_search", *changed]) == 2
-    assert told in capsys.readouterr().err
+    assert named in capsys.readouterr().err

@@ -64,13 +64,23 @@ def test_a_dry_run_lists_every_cell_and_leaves_everything_as_it_is(
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
+def test_a_dry_run_says_what_cannot_be_timed_and_lists_the_rest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert main([*RUN, "fail_at=50", "--dry-run", "--out", str(tmp_path / "runs")]) == 0
+    output = capsys.readouterr().out
+    assert "toy_reach/toy_search cannot be timed: RuntimeError: the toy broke" in output
+    assert "expected time unknown" in output
+
+
 def test_a_dry_run_refuses_what_a_run_would(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "thesis.tex").write_text("")
     assert main([*RUN, "--dry-run", "--out", str(tmp_path)]) == 2
     assert main([*RUN, "--dry-run", "--out", str(tmp_path / "thesis.tex")]) == 2
-    told = capsys.readouterr().err.strip().splitlines()
-    assert "contains files other than results" in told[0]
-    assert "(Not a directory)" in told[1]
+    refusals = capsys.readouterr().err.strip().splitlines()
+    assert "contains files other than results" in refusals[0]
+    assert "(Not a directory)" in refusals[1]
 
 
 def test_settings_of_a_search_are_those_of_the_cells_task_and_method(

@@ -5,18 +5,21 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from builders import sweep, toy_cells
 from codesign_bench.cell.cell import ResolvedCell, resolve_cells
 from codesign_bench.cell.variant import Variant
+from codesign_bench.config.settings import Sourced, StoredConfig
 from codesign_bench.storage.cells import find_cells
 from codesign_bench.storage.records import CellRecord, Timings
 from codesign_bench.sweep.pace import (
     CACHE_VARIABLE,
     FINISHED,
     MEASURED,
+    NotTimed,
     Pace,
     cache_file,
     kind_of,
@@ -130,9 +133,29 @@ def test_cells_are_measured_side_by_side_and_leave_nothing_behind(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_measurement_that_fails_says_why() -> None:
-    with pytest.raises(RuntimeError, match=r"(?s)measuring toy_reach/toy_search failed:.*the toy broke"):
+def test_a_measurement_that_fails_says_why_in_one_line() -> None:
+    line = r"^toy_reach/toy_search cannot be timed: RuntimeError: the toy broke$"
+    with pytest.raises(NotTimed, match=line):
         measure(resolved(overrides=("fail_at=50",)))
+    with pytest.raises(NotTimed, match="cannot be timed: the cell's process was killed by SIGKILL"):
+        measure(resolved(overrides=("die_at=50",)))
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"env_steps": -1},
+        {"timings": Timings(train_s=-1.0, evaluate_s=1.0)},
+        {"timings": Timings(train_s=1.0, evaluate_s=-1.0)},
+        *({"config": StoredConfig(run=run)} for run in ({}, {"evaluations": Sourced("many", "x")})),
+        {"config": StoredConfig(run={"evaluations": Sourced(-1, "x")})},
+    ],
+)
+def test_a_record_whose_numbers_cannot_be_tells_no_pace(tmp_path: Path, changed: dict[str, Any]) -> None:
+    sweep(toy_cells(), tmp_path / "runs")
+    (record,) = records(tmp_path / "runs")
+    assert len(of_finished([record])) == 1
+    assert of_finished([replace(record, **changed)]) == {}
 
 
 def test_the_cache_is_json_that_people_can_read() -> None:

@@ -21,7 +21,7 @@ class Damage:
     """Below the results folder."""
     name: str
     change: Change = field(compare=False)
-    told: bool = True
+    named: bool = True
     """Whether a command that reads the file must name it: some changes are harmless."""
 
 

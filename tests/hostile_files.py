@@ -118,11 +118,11 @@ def _interrupt(done: Path, folder: Path) -> None:
 def damages() -> Iterator[tuple[Damage, tuple[str, ...]]]:
     """Yield every damage with the commands that run on it."""
     on_cells = (*FOLDER_COMMANDS, RUN)
-    for name, change, told in of_a_cell_file():
+    for name, change, named in of_a_cell_file():
         # The folder of one cell may be anywhere, and cells of version 0.1.0 have no such entry.
         moved = name.startswith(("another ", "'axes'"))
-        yield Damage(f"{SEED}/cell.json", name, change, told), on_cells
-        yield Damage(f"one/{CELL}/cell.json", name, change, told and not moved), CELL_COMMANDS
+        yield Damage(f"{SEED}/cell.json", name, change, named), on_cells
+        yield Damage(f"one/{CELL}/cell.json", name, change, named and not moved), CELL_COMMANDS
     for file, column in (("curve.csv", "return_mean"), ("evaluation.csv", "return")):
         for name, change in {**OF_ANY_FILE, **of_a_table(column), "missing": Path.unlink}.items():
             yield Damage(f"{SEED}/{file}", name, change), on_cells
@@ -130,15 +130,15 @@ def damages() -> Iterator[tuple[Damage, tuple[str, ...]]]:
         yield Damage(f"{SEED}/cell.json", name, change), on_cells
         yield Damage(f"one/{CELL}/cell.json", name, change), CELL_COMMANDS
         yield Damage(f"{SEED}/policy.safetensors", name, change), on_cells
-        yield Damage(f"{SEED}/metrics.csv", name, change, told=False), on_cells
-        yield Damage(f"{SEED}/output.log", name, _beside(change), told=False), on_cells
+        yield Damage(f"{SEED}/metrics.csv", name, change, named=False), on_cells
+        yield Damage(f"{SEED}/output.log", name, _beside(change), named=False), on_cells
         yield Damage(f"one/{CELL}/policy.safetensors", name, change), CELL_COMMANDS
     for name, change in of_a_policy().items():
         yield Damage(f"one/{CELL}/policy.safetensors", name, change), CELL_COMMANDS
     for path, column in TABLES.items():
         for name, change in {**OF_ANY_FILE, **of_a_table(column)}.items():
             harmless = name == "a row less" and path in ("reference_points.csv",)
-            yield Damage(path, name, change, told=not harmless), FOLDER_COMMANDS
+            yield Damage(path, name, change, named=not harmless), FOLDER_COMMANDS
     yield Damage(f"{SEED}/cell.json", "missing", Path.unlink), FOLDER_COMMANDS
     structural = {
         name: change for name, change in of_a_policy().items() if "arrays" not in name and "numbers" not in name
@@ -146,7 +146,7 @@ def damages() -> Iterator[tuple[Damage, tuple[str, ...]]]:
     for name, change in {**OF_ANY_FILE, **structural}.items():
         yield Damage(f"{INTERRUPTED}/checkpoint.safetensors", name, change), (RESUME,)
     for name, change in {**OF_ANY_FILE, **OF_LARGE_ARRAYS}.items():
-        yield Damage(f"{INTERRUPTED}/{LARGE}", name, change, told=name not in AROUND), (RESUME,)
+        yield Damage(f"{INTERRUPTED}/{LARGE}", name, change, named=name not in AROUND), (RESUME,)
     for name, change in {**OF_ANY_FILE, **OF_SETTINGS}.items():
         yield Damage("tuned.json", name, change), (TUNED,)
 
@@ -224,13 +224,13 @@ def judge(damage: Damage, command: str, base: Path, work: Path) -> str:
     if code not in (0, 1, 2):
         return f"exit code {code}"
     name, folder = Path(damage.path).name, Path(damage.path).parent.name
-    if damage.told and not (name in printed and (folder in printed or folder == "")):
+    if damage.named and not (name in printed and (folder in printed or folder == "")):
         return f"did not name {damage.path}; exit code {code}; printed: {printed[-2000:]}"
-    if command == "report" and damage.told and code == 0 and name not in (out / "report.html").read_text():
+    if command == "report" and damage.named and code == 0 and name not in (out / "report.html").read_text():
         return "the page does not name it"
     if any(control in printed for control in CONTROLS):
         return f"printed a control character: {printed!r}"
-    if not damage.told and code == 2 and damage.name.startswith("a label with"):
+    if not damage.named and code == 2 and damage.name.startswith("a label with"):
         return f"refused: {printed}"
     left = [path for path in out.rglob(".*") if path.name.endswith(".partial")]
     return f"left {left}" if left else ""
@@ -334,8 +334,8 @@ def main() -> int:
         make_results(options.make)
         return 0
     listed = combinations()
-    told = [f"{command} {damage.path} {damage.name}" for damage, command in listed]
-    numbers = [number for number, text in enumerate(told) if all(word in text for word in options.only)]
+    texts = [f"{command} {damage.path} {damage.name}" for damage, command in listed]
+    numbers = [number for number, text in enumerate(texts) if all(word in text for word in options.only)]
     random.Random(0).shuffle(numbers)  # commands take turns: every fourth would always be the same one
     numbers = numbers[options.first :: options.every]
     started = time.monotonic()

@@ -62,7 +62,7 @@ def refuse_other_files(out: Path) -> None:
 
     Raises:
         UserError: it contains other files.
-        OSError: it is no folder, or cannot be read.
+        OSError: it is not a folder, or cannot be read.
     """
     ours = is_marked(out) or any(out.glob(CELL_PATTERN))
     # Another process may mark the folder after the first look and fill it before this one: hence the second look.

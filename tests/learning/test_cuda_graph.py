@@ -65,8 +65,8 @@ def test_where_it_cannot_be_captured_it_is_computed_and_the_log_says_so_once(
         for _ in range(WARM_UP + 4):
             replayed()
     assert (computation.calls, replayed.captured) == (WARM_UP + 4, False)
-    (told,) = caught
-    assert str(told.message) == (
+    (warning,) = caught
+    assert str(warning.message) == (
         "no CUDA graph, so updates take longer: operation not permitted when stream is capturing"
     )
 

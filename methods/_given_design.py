@@ -83,6 +83,11 @@ class GivenDesignMethod(TwoPhaseMethod[ConfigType]):
 
     def __init__(self, problem: Problem, config: ConfigType, streams: Streams) -> None:
         super().__init__(problem, config, streams)
+        self.make_learner()
+
+    def make_learner(self) -> None:
+        """Make an actor, a value network and their learner, with weights from the streams."""
+        problem, config, streams = self.problem, self.config, self.streams
         self.actor = self.actor_class(problem.task, config, streams["policy weights"])
         value = MLPValue(problem.task, config.value_net, streams["value weights"])
         self.learner = TwoPhaseLearner(problem, config, streams, self.actor, value, self.give_designs)

@@ -77,8 +77,8 @@ class BoRl(GivenDesignMethod[Config]):
 
     @classmethod
     def small(cls) -> Mapping[str, Any]:
-        """Return batches of a few episodes, small networks and few candidates."""
-        return {**super().small(), "candidates": 3, "first_candidates": 2}
+        """Return batches of a few episodes, small networks and few candidates, each of them for one batch."""
+        return {**super().small(), "candidates": 4, "first_candidates": 2, "search_share": 0.1}
 
     @classmethod
     def check(cls, config: Config, task_name: str) -> None:

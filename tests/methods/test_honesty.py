@@ -5,6 +5,7 @@ This file names methods; what holds for all of them is in `test_contract.py`.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import Any
@@ -52,7 +53,7 @@ def trained(make_method: MakeMethod, name: str) -> Method[Any]:
     return method
 
 
-@pytest.mark.parametrize("name", ["cma_rl", "hwasp_minimal", "cma_es"])
+@pytest.mark.parametrize("name", ["cma_rl", "hwasp_minimal", "cma_es", "bo_rl"])
 def test_one_design_for_all_goals(make_method: MakeMethod, push: Task, name: str) -> None:
     designs = trained(make_method, name).policy().design(starts(push))
     assert (designs == designs[0]).all()
@@ -65,7 +66,7 @@ def test_goal_conditioned_designers_design_by_goal(make_method: MakeMethod, push
     assert len(np.unique(designs, axis=0)) == len(designs)
 
 
-@pytest.mark.parametrize("name", ["gnn_ppo", "shared_arch", "cma_rl", "hwasp_minimal"])
+@pytest.mark.parametrize("name", ["gnn_ppo", "shared_arch", "cma_rl", "hwasp_minimal", "bo_rl"])
 def test_controllers_see_the_goal_and_the_design(make_method: MakeMethod, push: Task, name: str) -> None:
     policy, layout = trained(make_method, name).policy(), push.layout
     seen = np.repeat(starts(push, 1), 3, axis=0)
@@ -163,6 +164,50 @@ def test_an_archive_holds_the_best_plan_of_every_cell(push: Task) -> None:
         returns[active] += reward
         active = active[~(terminated | truncated)]
     np.testing.assert_allclose(returns, archive.returns, atol=1e-3)
+
+
+def searched(push: Task, **changes: Any) -> tuple[Any, list[Any]]:
+    """Return a small `bo_rl` after its budget, and the batches that it reported."""
+    method_class = load_method("bo_rl")
+    config = replace(method_class.config_class(), **{**method_class.small(), **changes})
+    method, left, reports = method_class(Problem(push), config, Streams(0)), 12_000, []
+    while left > 0:
+        reports.append(method.train(left))
+        left -= reports[-1].env_steps
+    return method, reports
+
+
+def test_bayesian_optimisation_splits_its_budget_evenly_and_ends_with_the_best_candidate(push: Task) -> None:
+    method, reports = searched(push, candidates=4, first_candidates=2, search_share=0.5)
+    judged = [int(report.metrics["candidates"]) for report in reports]
+    steps = {
+        count: sum(r.env_steps for r, c in zip(reports, [0, *judged], strict=False) if c == count) for count in range(5)
+    }
+    # A candidate takes 1/8 of the budget, in whole episodes; the rest is the best one's.
+    assert len(method.scores) == 4
+    assert [steps[count] for count in range(4)] == pytest.approx([1_500] * 4, abs=150)
+    assert steps[4] == sum(report.env_steps for report in reports) - sum(steps[count] for count in range(4)) > 4_000
+    best = method.designs[np.argmax(method.scores)]
+    np.testing.assert_allclose(method.policy().design(starts(push)), np.tile(best, (len(starts(push)), 1)), rtol=1e-6)
+    assert len(np.unique(method.designs, axis=0)) == 4
+
+
+def test_each_candidate_gets_a_new_controller_and_the_best_one_is_kept(push: Task) -> None:
+    method_class = load_method("bo_rl")
+    method: Any = method_class(Problem(push), replace(method_class.config_class(), **method_class.small()), Streams(0))
+    begun, kept = [], []
+    while len(method.scores) < 3:
+        weights = method.learner.policy().tensors()["controller.0.weight"]
+        if len(begun) == len(method.scores):
+            begun.append(weights)
+        method.train(10_000)
+        if len(kept) < len(method.scores):
+            kept.append(method.policy().tensors())
+    assert not any(np.array_equal(first, other) for first, other in itertools.combinations(begun, 2))
+    # Between candidates the policy is that of the best so far.
+    for count, (before, after) in enumerate(itertools.pairwise(kept), start=2):
+        better = method.scores[count - 1] > max(method.scores[: count - 1])
+        assert better != all(np.array_equal(before[name], after[name]) for name in before)
 
 
 def test_random_tools_are_drawn_anew_in_every_episode_and_the_middle_one_is_used(push: Task) -> None:

@@ -93,6 +93,16 @@ class SourceModule:
         found = [module for module, wanted in self.imports() if name in wanted or "*" in wanted]
         return found[0] if found else None
 
+    def stated(self, attribute: str) -> object:
+        """Return the literal that a class of the module assigns to `attribute`; None if none does."""
+        for part in self.tree.body:
+            for node in part.body if isinstance(part, ast.ClassDef) else []:
+                if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Constant):
+                    continue
+                if any(isinstance(target, ast.Name) and target.id == attribute for target in node.targets):
+                    return node.value.value
+        return None
+
 
 BYTECODE_HEADER = 16
 """Bytes of a compiled module that hold the time of its source."""

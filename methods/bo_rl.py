@@ -53,6 +53,7 @@ class BoRl(GivenDesignMethod[Config]):
 
     name = "bo_rl"
     label = "BO-RL"
+    tool_per_goal = False
     config_class = Config
 
     def __init__(self, problem: Problem, config: Config, streams: Streams) -> None:

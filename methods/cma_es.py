@@ -68,6 +68,7 @@ class CmaEs(Method[Config]):
 
     name = "cma_es"
     label = "CMA-ES"
+    tool_per_goal = False
     config_class = Config
 
     def __init__(self, problem: Problem, config: Config, streams: Streams) -> None:

@@ -44,6 +44,7 @@ class CmaRl(GivenDesignMethod[Config]):
 
     name = "cma_rl"
     label = "CMA-RL"
+    tool_per_goal = False
     config_class = Config
 
     def __init__(self, problem: Problem, config: Config, streams: Streams) -> None:

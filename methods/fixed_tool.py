@@ -40,6 +40,7 @@ class FixedTool(GivenDesignMethod[Config]):
 
     name = "fixed_tool"
     label = "fixed tool"
+    tool_per_goal = False
     config_class = Config
 
     def __init__(self, problem: Problem, config: Config, streams: Streams) -> None:

@@ -71,6 +71,7 @@ class HwaspMinimal(PPOMethod[Config]):
 
     name = "hwasp_minimal"
     label = "HWasP-minimal"
+    tool_per_goal = False
     config_class = Config
 
     @classmethod

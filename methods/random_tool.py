@@ -27,4 +27,5 @@ class RandomTool(GivenDesignMethod[Config]):
 
     name = "random_tool"
     label = "random tool"
+    tool_per_goal = False
     config_class = Config

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from builders import write_files
-from codesign_bench.source_code import essence, own_modules
+from codesign_bench.source_code import SourceModule, essence, own_modules
 
 CODE = b'''"""What it is for."""
 # A comment.
@@ -140,3 +140,12 @@ def test_a_foreign_member_has_the_shared_files_that_it_uses(modules: Path) -> No
 
 def test_what_was_defined_nowhere_has_no_code() -> None:
     assert own_modules("no_such_module") == []
+
+
+def test_a_literal_that_a_class_states_is_read_without_an_import(modules: Path) -> None:
+    (modules / "stating.py").write_text(
+        "raise ImportError\nother = 1\nclass A:\n    other: bool = 1\n    wanted = name = False\n    made = bool()\n"
+    )
+    module = SourceModule("stating")
+    assert [module.stated(name) for name in ("wanted", "name", "made", "other")] == [False, False, None, None]
+    assert SourceModule("not_there").stated("wanted") is None

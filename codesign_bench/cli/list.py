@@ -9,9 +9,12 @@ from rich.console import Console
 from codesign_bench.config.profiles import profiles
 from codesign_bench.console import printer
 from codesign_bench.errors import UnavailableError
-from codesign_bench.registry import names
+from codesign_bench.registry import built_in, names
+from codesign_bench.source_code import SourceModule
 from codesign_bench.study import DEFAULT_STUDY, load_study, study_names
 
+TOOLS = {True: "a tool per goal", False: "one tool for all goals", None: ""}
+"""`Method.tool_per_goal` -> its words; None: not known without an import."""
 HELP = "list methods, tasks, figures, studies and profiles"
 
 
@@ -24,9 +27,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     del options
     log, of_study = printer(console), load_study(DEFAULT_STUDY).methods
     beyond = [name for name in names("methods") if name not in of_study]
+    width = max(map(len, names("methods")))
     for title, members in (("methods", of_study), ("methods beyond", beyond)):
-        for line in [title, *(f"  {name}" for name in members)] if members else []:
-            log(line)
+        if members:
+            log(title)
+        told = {name: _tools(name) for name in members}
+        for name in sorted(members, key=lambda name: list(TOOLS.values()).index(told[name])):  # stable: else in order
+            log(f"  {name:{width}} {told[name]}".rstrip())
     for title, group in (("tasks", "tasks"), ("figures", "paper_figs")):
         log(title)
         for name in names(group):
@@ -39,6 +46,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
         for name, text in entries:
             log(f"  {name:8} {text}")
     return 0
+
+
+def _tools(method: str) -> str:
+    """Return for how many goals a built-in method's tools are; nothing for those of other packages."""
+    if method not in built_in("methods"):
+        return TOOLS[None]
+    return TOOLS[SourceModule(f"codesign_bench.methods.{method}").stated("tool_per_goal") is not False]
 
 
 def _title(study: str) -> str:

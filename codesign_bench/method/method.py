@@ -68,6 +68,9 @@ class Method(ABC, Generic[ConfigType]):
     """The method's name, which is also the name of its file."""
     label: ClassVar[str]
     """The method's name in figures; see `label_of`."""
+    tool_per_goal: ClassVar[bool] = True
+    """Whether the policy may design another tool for another goal; False: one tool for all goals. Written as a literal,
+    for `list` reads it without importing the method."""
     config_class: ClassVar[type]
     """Frozen dataclass of the hyperparameters; every field has a default, and any task runs with the defaults."""
 

@@ -75,6 +75,20 @@ def test_training_changes_the_policy(make_method: MakeMethod, name: str) -> None
 
 
 @EVERY_METHOD
+def test_a_method_designs_a_tool_per_goal_where_it_says_so_and_one_for_all_elsewhere(
+    make_method: MakeMethod, name: str, push: Task
+) -> None:
+    method = make_method(name)
+    # Some begin with one tool for all, and some search for a while before they choose.
+    for _ in range(PATIENCE if method.tool_per_goal else 2):
+        method.train(BUDGET)
+        tools = np.unique(method.policy().design(observations(push)[0]), axis=0)
+        if len(tools) > 1:
+            break
+    assert (len(tools) > 1) == method.tool_per_goal
+
+
+@EVERY_METHOD
 def test_reported_steps_are_the_simulated_ones(
     make_method: MakeMethod, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -5,7 +5,7 @@ Shapes: `N` and `M` seeds.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
@@ -20,7 +20,6 @@ from codesign_bench.claims.statistics import (
     WELCH_INTERVAL,
     check_methods,
     effect_scale,
-    run_command,
     seeds_of,
 )
 
@@ -32,8 +31,8 @@ LEAST_BUDGET = 0.05
 """Share of the budget that a method must save: about the distance of two evaluations (ours)."""
 
 
-def final_return_above(task: str, method: str, baseline: str, seeds: int) -> Rule:
-    """Return the rule for "`method` ends with a higher return than `baseline` on `task`"."""
+def final_return_above(task: str, method: str, baseline: str, needs: tuple[str, ...]) -> Rule:
+    """Return the rule for "`method` ends with a higher return than `baseline` on `task`"; see `Rule.needs`."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         del rng  # nothing is drawn
@@ -56,7 +55,7 @@ def final_return_above(task: str, method: str, baseline: str, seeds: int) -> Rul
         words=f"supported if {WELCH_INTERVAL} is above 0 and the difference is at least {LEAST_SHARE:.0%} of "
         f"{EFFECT_SCALE}, contradicted if the same holds below 0; ceiling if both methods' mean "
         f"success is above {ALMOST_ALL:g}",
-        needs=(run_command("all", task, seeds),),
+        needs=needs,
         judge=judge,
     )
 
@@ -68,8 +67,8 @@ def _at_ceiling(evidence: Evidence, task: str, *methods: str) -> bool:
     return all(evidence.final_successes(task, method).mean() > ALMOST_ALL for method in methods)
 
 
-def sooner(task: str, method: str, baseline: str, seeds: int) -> Rule:
-    """Return the rule for "`method` needs fewer environment steps on `task` than `baseline`"."""
+def sooner(task: str, method: str, baseline: str, needs: tuple[str, ...]) -> Rule:
+    """Return the rule for "`method` needs fewer environment steps on `task` than `baseline`"; see `Rule.needs`."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         del rng  # nothing is drawn
@@ -100,7 +99,7 @@ def sooner(task: str, method: str, baseline: str, seeds: int) -> Rule:
         "the way from the start to the lesser of the two mean final returns; never is the whole budget",
         words=f"supported if {WELCH_INTERVAL} is below 0 and at least {LEAST_BUDGET:.0%} of the budget is saved, "
         "contradicted if the same holds above 0",
-        needs=(run_command("all", task, seeds),),
+        needs=needs,
         judge=judge,
     )
 
@@ -130,8 +129,8 @@ def means_along(rows: pd.DataFrame) -> np.ndarray:
     return np.array([stats.mean_along(curve["env_steps"], curve["return_mean"]) for curve in curves])
 
 
-def ahead_across_tasks(tasks: Sequence[str], method: str, baseline: str, seeds: Mapping[str, int]) -> Rule:
-    """Return the rule for "`method` ends above `baseline` across `tasks`"."""
+def ahead_across_tasks(tasks: Sequence[str], method: str, baseline: str, needs: tuple[str, ...]) -> Rule:
+    """Return the rule for "`method` ends above `baseline` across `tasks`"; see `Rule.needs`."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         pairs = []
@@ -157,6 +156,6 @@ def ahead_across_tasks(tasks: Sequence[str], method: str, baseline: str, seeds: 
         statistic=f"difference of mean final returns, as a share of {EFFECT_SCALE}, averaged over tasks",
         words="supported if the 95 % Welch-Satterthwaite interval over tasks and seeds is above 0 and the difference "
         f"is at least {LEAST_SHARE:g}, contradicted if the same holds below 0; p from permutations within tasks",
-        needs=tuple(run_command("all", task, seeds[task]) for task in tasks),
+        needs=needs,
         judge=judge,
     )

@@ -37,6 +37,15 @@ def thread_environment() -> dict[str, str]:
     return {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1"), SAFE_PATH_VARIABLE: "1"}
 
 
+def pin_threads() -> None:
+    """Pin torch to one thread if it has been imported; other libraries read their environment variables.
+
+    Floating-point sums depend on a library's number of threads.
+    """
+    if "torch" in sys.modules:
+        sys.modules["torch"].set_num_threads(1)
+
+
 @contextmanager
 def children_with_safe_modules() -> Iterator[None]:
     """Keep the working folder off the module path of every process that this one starts, directly or by a library."""

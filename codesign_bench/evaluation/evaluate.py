@@ -65,17 +65,32 @@ def evaluate(
         policy: designs and acts.
         tradeoff: added to the task's reward if given.
         instances: (N, I) in the instance space's units; None: the task's fixed evaluation instances.
-        simulators: lends the simulator; None: a new one.
+        simulators: lend the simulator, and share the work if they use several cores; None: new ones, on one core.
     """
     instances = task.evaluation_instances() if instances is None else instances
-    lender = Simulators(task) if simulators is None else simulators
-    parts = []
-    for part in portions(len(instances), task):
-        with lender.lend(len(part)) as simulator:
-            parts.append(_play(Episodes(task, len(part), tradeoff, simulator), policy, instances[part]))
+    shared = Simulators(task) if simulators is None else simulators
+    plays = [_Play(policy, tradeoff, instances[part]) for part in portions(len(instances), task)]
+    parts = shared.share(_Play.run, plays)
     return Evaluation(
         **{field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Evaluation)}
     )
+
+
+@dataclass(frozen=True)
+class _Play:
+    """Some of the instances, with all that another process needs to play them."""
+
+    policy: Behaviour
+    tradeoff: Tradeoff | None
+    instances: Floats
+
+    @staticmethod
+    def run(simulators: Simulators, play: _Play) -> Evaluation:
+        """Run one episode on each of the instances."""
+        count = len(play.instances)
+        with simulators.lend(count) as simulator:
+            episodes = Episodes(simulators.task, count, play.tradeoff, simulator)
+            return _play(episodes, play.policy, play.instances)
 
 
 def _play(episodes: Episodes, policy: Behaviour, instances: Floats) -> Evaluation:

@@ -8,18 +8,52 @@ number of slots, so results do not depend on the number of processes.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
 from codesign_bench.config.run_settings import OVERSHOOT
 from codesign_bench.learning.explorer import Explorer
 from codesign_bench.learning.rollout import Collector
-from codesign_bench.learning.rollout_pool import Group, RolloutPool
 from codesign_bench.learning.trajectories import Trajectories, joined
 from codesign_bench.method import Problem
 from codesign_bench.seeding import Streams
+from codesign_bench.task.simulators import Simulators
 
 GROUP_SLOTS = 96
 """Fewest slots of a group, unless the batch has fewer: smaller calls of the policy cost more per step."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """One group of slots of a batch."""
+
+    steps: int
+    """Total environment steps of its slots."""
+    slots: int
+    """S of the group"""
+    rng: np.random.Generator
+    first_slot: int = 0
+    """The index of its first slot in the batch."""
+    most: int | None = None
+    """Environment steps that its slots' further episodes must not exceed; None: no limit."""
+
+
+@dataclass(frozen=True)
+class _Play:
+    """A group with all that another process needs to play it."""
+
+    problem: Problem
+    explorer: Explorer
+    group: Group
+
+    @staticmethod
+    def run(simulators: Simulators, play: _Play) -> tuple[Trajectories, Any]:
+        """Play the group; return what happened and the state of its generator afterwards."""
+        group, collector = play.group, Collector(play.problem, simulators)
+        played = collector.collect(play.explorer, group.steps, group.slots, group.rng, group.first_slot, group.most)
+        return played, group.rng.bit_generator.state
 
 
 class BatchCollector:
@@ -27,12 +61,10 @@ class BatchCollector:
 
     def __init__(self, problem: Problem, streams: Streams) -> None:
         self.problem, self.streams = problem, streams
-        self._collector = Collector(problem)
-        self._pool: RolloutPool | None = None
 
     def use_cores(self, count: int) -> None:
         """Play groups in up to `count` processes; results do not change."""
-        self._pool = RolloutPool(self.problem, count) if count > 1 else None
+        self.problem.simulators.use_cores(count)
 
     def collect(
         self, explorer: Explorer, steps: int, num_slots: int | None = None, most: int | None = None
@@ -49,9 +81,11 @@ class BatchCollector:
             most: environment steps after which no episode is begun, except the first of every slot; None: no limit.
         """
         groups = self._groups(steps, num_slots or slots_for(steps, self.problem.task.horizon + 1), most)
-        if self._pool is not None and len(groups) > 1:
-            return joined(self._pool.collect(explorer, groups))
-        return joined([group.collect(self._collector, explorer) for group in groups])
+        results = self.problem.simulators.share(_Play.run, [_Play(self.problem, explorer, group) for group in groups])
+        # Another process advances a copy of the generator; the next batch must not repeat its random numbers.
+        for group, (_, advanced) in zip(groups, results, strict=True):
+            group.rng.bit_generator.state = advanced
+        return joined([played for played, _ in results])
 
     def _groups(self, steps: int, num_slots: int, most: int | None) -> list[Group]:
         groups, first = [], 0

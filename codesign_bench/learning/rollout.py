@@ -16,13 +16,16 @@ from codesign_bench.learning.trajectories import Trajectories
 from codesign_bench.method import Problem
 from codesign_bench.task import Booleans, Singles, Slots
 from codesign_bench.task.episodes import Episodes
+from codesign_bench.task.simulators import Simulators
 
 
 class Collector:
-    """Plays episodes of a problem in the problem's shared simulator."""
+    """Plays episodes of a problem."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, simulators: Simulators | None = None) -> None:
         self.problem = problem
+        self.simulators = simulators
+        """Lend the simulator; None: those that the problem shares."""
 
     def collect(
         self,
@@ -45,7 +48,7 @@ class Collector:
                 every slot is always played. None: no limit.
         """
         share = max(1, steps // num_slots)
-        with self.problem.episodes(num_slots) as episodes:
+        with self.problem.episodes(num_slots, self.simulators) as episodes:
             return _Rollout(self.problem, episodes, explorer, share, num_slots, rng, first_slot, most).play()
 
 

@@ -143,7 +143,10 @@ class Method(ABC, Generic[ConfigType]):
 
     @abstractmethod
     def policy(self) -> Policy:
-        """Return the current policy; later training may change it."""
+        """Return the current policy; later training may change it.
+
+        With several cores, evaluation sends it to other processes by pickle.
+        """
 
     @classmethod
     @abstractmethod

@@ -36,9 +36,14 @@ class Problem:
         return Simulators(self.task)
 
     @contextmanager
-    def episodes(self, num_slots: int) -> Iterator[Episodes]:
-        """Lend episodes of the task with at least `num_slots` slots for the duration of the `with` block."""
-        with self.simulators.lend(num_slots) as simulator:
+    def episodes(self, num_slots: int, simulators: Simulators | None = None) -> Iterator[Episodes]:
+        """Lend episodes of the task with at least `num_slots` slots for the duration of the `with` block.
+
+        Args:
+            num_slots: slots to lend at least.
+            simulators: lend the simulator; None: those shared by training and evaluation.
+        """
+        with (self.simulators if simulators is None else simulators).lend(num_slots) as simulator:
             yield Episodes(self.task, num_slots, self.tradeoff, simulator)
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:

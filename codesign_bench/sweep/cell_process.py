@@ -23,7 +23,7 @@ from codesign_bench.code_version import code_version
 from codesign_bench.errors import UserError
 from codesign_bench.machine import host_facts, package_versions
 from codesign_bench.plugins import import_modules
-from codesign_bench.processes import watched_by_parent
+from codesign_bench.processes import pin_threads, watched_by_parent
 from codesign_bench.storage.cells import table_checksums
 from codesign_bench.storage.checkpoint import remove_checkpoint
 from codesign_bench.storage.files import remove_partial_files
@@ -85,7 +85,7 @@ def run_locked(cell: Cell, folder: Path, *, retry: bool, same_code: bool = False
         remove_checkpoint(folder / CHECKPOINT_FILE)  # a failed cell that is mended starts anew
         before = None
     remove_partial_files(folder)
-    pin_threads()
+    pin_threads()  # methods use more cores in another way: see `Method.use_cores`
     record = describe(resolved, before)
     record.write(folder)
     return _run_and_record(resolved, folder, record)
@@ -119,16 +119,6 @@ def _earlier(before: CellRecord, record: CellRecord) -> tuple[Mapping[str, Any],
     """Return the conditions of the parts of an interrupted run that differ from those under which it is resumed."""
     parts = (*before.earlier, before.conditions)
     return tuple(part for part in parts if not same_conditions(part, record.conditions))
-
-
-def pin_threads() -> None:
-    """Pin torch to one thread if a method has imported it; other libraries read their environment variables.
-
-    Floating-point sums depend on a library's number of threads. Methods use more cores in another way: see
-    `Method.use_cores`.
-    """
-    if "torch" in sys.modules:
-        sys.modules["torch"].set_num_threads(1)
 
 
 def _run_and_record(resolved: ResolvedCell, folder: Path, record: CellRecord) -> int:

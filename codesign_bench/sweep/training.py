@@ -49,6 +49,7 @@ class CellRun:
         self.problem = resolved.problem()
         self.streams = Streams(cell.seed)
         self.method: Method[Any] = resolved.method_class(self.problem, config.method, self.streams)
+        self.problem.simulators.use_cores(config.run.threads)
         self.method.use_cores(config.run.threads)
         self.method.use_device(config.run.device)
         checkpoint = load_checkpoint(folder / CHECKPOINT_FILE)

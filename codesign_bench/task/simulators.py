@@ -1,4 +1,4 @@
-"""Reuse a task's simulator across batches and evaluations.
+"""Reuse a task's simulator across batches and evaluations, and share work among processes with a simulator each.
 
 Making a simulator may be slow (worlds, compiled kernels), and two may need too much memory (a 3D world takes 28 MB).
 Training and evaluation therefore share one: each borrows it while its episodes run.
@@ -6,11 +6,17 @@ Training and evaluation therefore share one: each borrows it while its episodes 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
+from typing import TypeVar
 
 from codesign_bench.task.simulator import Simulator
 from codesign_bench.task.task import Task
+from codesign_bench.task.workers import Workers
+
+Part = TypeVar("Part")
+Result = TypeVar("Result")
 
 
 class Simulators:
@@ -23,6 +29,21 @@ class Simulators:
     def __init__(self, task: Task) -> None:
         self.task = task
         self._idle: Simulator | None = None
+        self._workers: Workers[Simulators] | None = None
+
+    def use_cores(self, count: int) -> None:
+        """Share work among up to `count` processes from now on; by default this process does all of it."""
+        if count != (1 if self._workers is None else self._workers.count):
+            self._workers = Workers(partial(Simulators, self.task), count) if count > 1 else None
+
+    def share(self, work: Callable[[Simulators, Part], Result], parts: Sequence[Part]) -> list[Result]:
+        """Return what `work` returns for every one of `parts`, in their order.
+
+        In another process it gets other simulators, and a copy of its part.
+        """
+        if self._workers is None or len(parts) < 2:
+            return [work(self, part) for part in parts]
+        return self._workers.map(work, parts)
 
     @contextmanager
     def lend(self, num_slots: int) -> Iterator[Simulator]:

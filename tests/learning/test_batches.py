@@ -1,13 +1,19 @@
-"""How the slots of a batch are counted and divided into groups."""
+"""How the slots of a batch are counted and divided into groups, which cores may share: no number depends on them."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
+from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.learning import batches
 from codesign_bench.learning.batches import BatchCollector, group_sizes, most_steps, slots_for
 from codesign_bench.learning.explorer import Explorer, Sample
-from codesign_bench.method import Problem
+from codesign_bench.learning.two_phase import TwoPhaseLearner
+from codesign_bench.method import Problem, load_method, method_names
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Singles, Slots, load_task
 
@@ -73,3 +79,50 @@ def test_a_limit_that_leaves_room_changes_no_number() -> None:
     )
     assert free.reward.tobytes() == limited.reward.tobytes()
     assert free.env_steps == limited.env_steps
+
+
+@pytest.fixture
+def small_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Several groups although batches are small."""
+    monkeypatch.setattr(batches, "GROUP_SLOTS", 4)
+
+
+def trained(
+    make_learner: Callable[..., TwoPhaseLearner], cores: int, **settings: Any
+) -> tuple[TwoPhaseLearner, list[dict[str, float]]]:
+    """Return a learner after three batches of 16 slots in four groups, and its metrics."""
+    learner = make_learner(batch_size=96, **settings)
+    learner.use_cores(cores)
+    return learner, [learner.train(96)[0].metrics for _ in range(3)]
+
+
+@pytest.mark.usefixtures("small_groups")
+@pytest.mark.parametrize(("credit", "cores"), [("separate", 3), ("joint", 2)])
+def test_no_number_depends_on_the_cores(make_learner: Callable[..., TwoPhaseLearner], credit: str, cores: int) -> None:
+    one, metrics = trained(make_learner, 1, design_credit=credit)
+    more, same = trained(make_learner, cores, design_credit=credit)
+    assert len(group_sizes(16, 1_000)) == 4
+    assert metrics == same
+    for name, array in one.state().arrays.items():
+        np.testing.assert_array_equal(array, more.state().arrays[name], err_msg=name)
+    assert one.streams.state() == more.streams.state()
+
+
+@pytest.mark.usefixtures("toy", "small_groups")
+@pytest.mark.parametrize("name", method_names())
+def test_no_method_depends_on_the_cores_nor_does_its_evaluation(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    method_class, task = load_method(name), load_task("toy_reach")
+    monkeypatch.setattr(type(task), "max_slots", 8)  # an evaluation in many parts
+    policies, evaluations = [], []
+    for cores in (1, 2):
+        config: Any = method_class.config_class(**method_class.small())
+        method = method_class(Problem(task), config, Streams(0))
+        method.problem.simulators.use_cores(cores)
+        method.use_cores(cores)
+        method.train(96)  # Five groups at least, where a method rolls out in groups.
+        policies.append(method.policy().tensors())
+        evaluations.append(evaluate(task, method.policy(), simulators=method.problem.simulators))
+    for key, array in policies[0].items():
+        np.testing.assert_array_equal(array, policies[1][key], err_msg=key)
+    for key, array in vars(evaluations[0]).items():
+        np.testing.assert_array_equal(array, vars(evaluations[1])[key], err_msg=key)

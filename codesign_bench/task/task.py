@@ -78,7 +78,8 @@ class Task(ABC):
     """Profile -> run settings that differ for this task, e.g. a larger budget."""
     num_evaluation_instances: ClassVar[int] = 128
     max_slots: ClassVar[int] = 1_000
-    """Most slots to request of one simulator for many episodes, because a world may need much memory."""
+    """Most slots to request of one simulator for many episodes. Few keep memory low and spread work over many cores;
+    many make a call of the policy cheap per step."""
 
     @property
     def goal_space(self) -> Box:

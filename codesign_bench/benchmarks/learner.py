@@ -22,22 +22,19 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from codesign_bench.benchmarks.output import write_speeds
 from codesign_bench.benchmarks.workload import Speed, Workload, together
-from codesign_bench.code_version import code_version
 from codesign_bench.config.resolve import resolve
 from codesign_bench.console import print_table, printer
 from codesign_bench.errors import UserError
 from codesign_bench.machine import (
     available_cores,
     computes_in_bfloat16,
-    host_facts,
-    package_versions,
     peak_megabytes,
 )
 from codesign_bench.method import Problem, load_method, method_names, usable_methods
 from codesign_bench.processes import thread_environment
 from codesign_bench.seeding import Streams
-from codesign_bench.storage.files import json_bytes, write_output
 from codesign_bench.task import load_task
 
 
@@ -183,9 +180,7 @@ def bench_learner(work: Workload, names: Sequence[str], out: Path | None, consol
     for name, speed in found.items():
         if speed.how:
             say(f"{known[name].title}: {speed.how}")
-    if out is not None:
-        _write(out, work, top, found)
-        say(str(out))
+    write_speeds(out, _content(work, top, found), work.cores, say)
 
 
 def _row(speed: Speed, work: Workload, top: float) -> tuple[str, ...]:
@@ -199,19 +194,15 @@ def _row(speed: Speed, work: Workload, top: float) -> tuple[str, ...]:
     )
 
 
-def _write(out: Path, work: Workload, top: Mapping[str, float], found: Mapping[str, Speed]) -> None:
-    content = {
+def _content(work: Workload, top: Mapping[str, float], found: Mapping[str, Speed]) -> dict[str, Any]:
+    return {
         "workload": asdict(work),
         "ceiling_gigaflops": dict(top),
         "learners": {
             name: {**asdict(speed), "env_steps_per_second": speed.end_to_end(work.epochs)}
             for name, speed in found.items()
         },
-        "versions": package_versions(),
-        "code": code_version().to_json(),
-        "host": host_facts(work.cores),
     }
-    write_output(f"--out {out}", out, json_bytes(content))
 
 
 def _in_process(name: str, work: Workload) -> Speed:

@@ -12,11 +12,10 @@ from statistics import median
 
 from rich.console import Console
 
+from codesign_bench.benchmarks.output import write_speeds
 from codesign_bench.cell.cell import Cell, ResolvedCell, resolve_cell
-from codesign_bench.code_version import code_version
 from codesign_bench.console import duration, print_table, printer
-from codesign_bench.machine import available_cores, host_facts, package_versions
-from codesign_bench.storage.files import json_bytes, write_output
+from codesign_bench.machine import available_cores
 from codesign_bench.sweep.pace import NotTimed, Pace, measure
 
 HEADER = ("cell", "profile", "at a time", "steps/s each", "steps/s together", "a cell", "cells/hour", "MB each")
@@ -100,15 +99,7 @@ def bench_sweep(
             say(f"left out: {error}")
     print_table(console, HEADER, [_row(each) for each in found])
     say(f"on {available_cores()} cores; each cell trained for some seconds and was evaluated once")
-    if out is not None:
-        content = {
-            "sweep": [asdict(each) for each in found],
-            "versions": package_versions(),
-            "code": code_version().to_json(),
-            "host": host_facts(1),
-        }
-        write_output(f"--out {out}", out, json_bytes(content))
-        say(str(out))
+    write_speeds(out, {"sweep": [asdict(each) for each in found]}, 1, say)
 
 
 def _row(found: Projection) -> tuple[str, ...]:

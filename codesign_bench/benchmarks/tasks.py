@@ -9,24 +9,32 @@ Shapes: `B` slots, `C` control.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
+from scipy.special import ndtr
 
-from codesign_bench.console import print_table
+from codesign_bench.benchmarks.output import write_speeds
+from codesign_bench.console import print_table, printer
 from codesign_bench.errors import UserError
-from codesign_bench.seeding import generator
-from codesign_bench.task import load_task
+from codesign_bench.learning.batches import GROUP_SLOTS, BatchCollector
+from codesign_bench.learning.explorer import Explorer, Sample
+from codesign_bench.method import Problem
+from codesign_bench.seeding import Streams, generator
+from codesign_bench.task import Singles, Slots, Task, load_task
 from codesign_bench.task.episodes import Episodes
 
 SLOTS = 64
 HELD_STEPS = 10
 """Random controls are redrawn after this many steps."""
 SEED = 0
+GROUPS_PER_CORE = 4
+"""Groups of slots of a batch for every core."""
 
 
 @dataclass(frozen=True)
@@ -56,25 +64,67 @@ class TaskSpeed:
         )
 
 
+@dataclass(frozen=True)
+class Scaling:
+    """Random episodes of one task in whole batches, on one core and on several."""
+
+    cores: int
+    one: float
+    """Environment steps/s on one core."""
+    several: float
+    """The same on `cores` cores."""
+
+    @property
+    def row(self) -> tuple[str, ...]:
+        """The cells of the printed table."""
+        faster = self.several / self.one
+        return f"{self.one:,.0f}", f"{self.several:,.0f}", f"{faster:.2f}", f"{faster / self.cores:.2f}"
+
+
+class RandomActions(Explorer):
+    """Uniform designs and controls, at next to no cost."""
+
+    def __init__(self, task: Task) -> None:
+        super().__init__(task.design_space.size, task.control_space.size)
+
+    def sample_design(self, slots: Slots, observation: Singles, noise: Singles) -> Sample:
+        """Return the actions that standard-normal `noise` stands for."""
+        return Sample((2.0 * ndtr(noise) - 1.0).astype(np.float32))
+
+    sample_control = sample_design
+
+
 HEADER = ("task", "env steps/s", "control step (us)", "engine (us)", "ratio", "episode starts")
 
 
-def bench_tasks(names: Sequence[str], seconds: float, console: Console) -> None:
-    """Print the speed of each of the tasks `names`, measured for about `seconds` each, on one core.
+SCALING_HEADER = ("task", "steps/s, 1 core", "steps/s, {cores} cores", "faster", "share of {cores}")
+
+
+def bench_tasks(
+    names: Sequence[str], seconds: float, console: Console, cores: int = 1, out: Path | None = None
+) -> None:
+    """Print the speed of tasks on one core and, if there are more `cores`, how batches of episodes scale with them.
+
+    Args:
+        names: names of tasks.
+        seconds: time of each measurement.
+        console: where tables go.
+        cores: processes that share a batch.
+        out: JSON file.
 
     Raises:
-        UserError: an unknown task.
+        UserError: an unknown task, or a file that is not writable.
     """
     tasks = {name: load_task(name) for name in names}
-    rows = []
+    speeds: dict[str, TaskSpeed] = {}
     for name in tasks:
         console.print(
             f"{name}: random episodes in {min(SLOTS, tasks[name].max_slots)} slots for {seconds:g} s",
             markup=False,
             highlight=False,
         )
-        rows.append((name, *measure_task(name, seconds).row))
-    print_table(console, HEADER, rows)
+        speeds[name] = measure_task(name, seconds)
+    print_table(console, HEADER, [(name, *speed.row) for name, speed in speeds.items()])
     console.print(
         "control step: one slot's step with action, observation and reward\n"
         "engine: the physics engine's own step calls within it; ratio: the first over the second\n"
@@ -82,6 +132,36 @@ def bench_tasks(names: Sequence[str], seconds: float, console: Console) -> None:
         markup=False,
         highlight=False,
     )
+    scaling = {name: measure_scaling(task, seconds, cores) for name, task in tasks.items()} if cores > 1 else {}
+    if scaling:
+        header = [text.format(cores=cores) for text in SCALING_HEADER]
+        print_table(console, header, [(name, *found.row) for name, found in scaling.items()])
+    content = {"tasks": _by_name(speeds), "scaling": _by_name(scaling)}
+    write_speeds(out, content, cores, printer(console))
+
+
+def _by_name(speeds: Mapping[str, TaskSpeed | Scaling]) -> dict[str, Any]:
+    return {name: asdict(speed) for name, speed in speeds.items()}
+
+
+def measure_scaling(task: Task, seconds: float, cores: int) -> Scaling:
+    """Play whole batches of random episodes for about `seconds` each, on one core and on `cores`.
+
+    A batch has one episode per slot, as in training, and several groups of slots for every core.
+    """
+    speeds = []
+    for count in (1, cores):
+        collector = BatchCollector(Problem(task), Streams(SEED))
+        collector.use_cores(count)
+        # The same slots on any number of cores: enough that no core waits for work for long.
+        slots = GROUPS_PER_CORE * cores * min(GROUP_SLOTS, task.max_slots)
+        steps = slots * (task.horizon + 1)
+        collector.collect(RandomActions(task), slots, slots)  # starts processes and makes simulators
+        begun, played = time.perf_counter(), 0
+        while time.perf_counter() - begun < seconds:
+            played += collector.collect(RandomActions(task), steps, slots).env_steps
+        speeds.append(played / (time.perf_counter() - begun))
+    return Scaling(cores, *speeds)
 
 
 def measure_task(name: str, seconds: float, slots: int = SLOTS) -> TaskSpeed:

@@ -28,6 +28,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     tasks.add_argument("--task", nargs="+", default=[ALL], metavar="T", help="names, or all (default)")
     tasks.add_argument("--seconds", type=OfKind(Seconds), default=5.0, metavar="S", help="seconds per task; default: 5")
+    tasks.add_argument(
+        "--cores",
+        type=OfKind(Jobs),
+        default=1,
+        metavar="N",
+        help="also measure batches of episodes on one core and on N; default: 1",
+    )
+    tasks.add_argument("--out", type=out_file, metavar="FILE", help="also write the numbers to this JSON file")
     learner = kinds.add_parser("learner", help="learners, compared with those of other libraries", allow_abbrev=False)
     learner.add_argument("--task", metavar="T", help="default: the first task that `list` shows")
     learner.add_argument("--profile", metavar="P", help="profile of the networks; default: the paper's")
@@ -66,7 +74,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.what == "tasks":
         from codesign_bench.benchmarks.tasks import bench_tasks
 
-        bench_tasks(chosen_tasks(options.task, printer(console)), options.seconds, console)
+        names = chosen_tasks(options.task, printer(console))
+        bench_tasks(names, options.seconds, console, options.cores, options.out)
         return 0
     if options.what == "sweep":
         return _run_sweep(options, console)

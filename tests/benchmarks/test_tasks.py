@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from codesign_bench.benchmarks.tasks import HEADER, TaskSpeed, measure_task
+from codesign_bench.benchmarks.tasks import HEADER, SCALING_HEADER, Scaling, TaskSpeed, measure_scaling, measure_task
 from codesign_bench.cli import main
 from codesign_bench.task import Floats, Simulator, Slots, Task, load_task
 
@@ -58,6 +60,32 @@ def test_the_printed_numbers_by_hand() -> None:
     speed = TaskSpeed(env_steps=1_100, control_steps=1_000, engine=0.2, control=0.3, starts=0.1)
     # 1,100 steps in 0.4 s; 0.3 s / 1,000 = 300 us; 200 us; 1.5; a quarter.
     assert speed.row == ("2,750", "300.0", "200.0", "1.50", "25 %")
+
+
+def test_the_printed_scaling_by_hand() -> None:
+    assert Scaling(cores=8, one=1_000.0, several=6_000.0).row == ("1,000", "6,000", "6.00", "0.75")
+
+
+@pytest.mark.usefixtures("toy")
+def test_batches_of_random_episodes_are_played_on_one_core_and_on_several() -> None:
+    found = measure_scaling(load_task("toy_reach"), seconds=0.01, cores=2)
+    assert found.cores == 2
+    assert found.one > 0.0
+    assert found.several > 0.0
+
+
+@pytest.mark.usefixtures("toy")
+def test_the_numbers_go_to_a_file_with_the_conditions_they_were_measured_under(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "speed.json"
+    arguments = ["--task", "toy_reach", "--seconds", "0.01", "--cores", "2", "--out", str(out)]
+    assert main(["bench", "tasks", *arguments]) == 0
+    assert SCALING_HEADER[2].format(cores=2) in capsys.readouterr().out
+    content = json.loads(out.read_text())
+    assert set(content) == {"tasks", "scaling", "versions", "code", "host"}
+    assert content["scaling"]["toy_reach"]["cores"] == 2
+    assert content["tasks"]["toy_reach"]["control_steps"] > 0
 
 
 def test_the_command_prints_a_row_per_task(capsys: pytest.CaptureFixture[str]) -> None:

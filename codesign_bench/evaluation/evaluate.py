@@ -1,6 +1,6 @@
 """Evaluate a policy on a task's fixed evaluation instances, acting with its means.
 
-Shapes: `N` evaluation instances, `I` instance, `D` design.
+Shapes: `N` evaluation instances, `I` instance, `D` design, `H` horizon, `C` control.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from codesign_bench.task import Behaviour, Booleans, Floats, Task
 from codesign_bench.task.episodes import Episodes, Tradeoff, portions
-from codesign_bench.task.play import play
+from codesign_bench.task.play import Observe, play
 from codesign_bench.task.simulators import Simulators
 
 
@@ -37,6 +37,8 @@ class Evaluation:
     """(N,) the task's outcome at the end."""
     effort: Floats
     """(N,) mean c_used / c_max of equation 1 over the episode."""
+    controls: Floats
+    """(N, H, C) in [-1, 1]; zero after the end of an episode."""
 
     @property
     def summary(self) -> dict[str, float]:
@@ -57,6 +59,7 @@ def evaluate(
     tradeoff: Tradeoff | None = None,
     instances: Floats | None = None,
     simulators: Simulators | None = None,
+    observe: Observe | None = None,
 ) -> Evaluation:
     """Run one episode of `policy` on each of `instances`.
 
@@ -66,27 +69,30 @@ def evaluate(
         tradeoff: added to the task's reward if given.
         instances: (N, I) in the instance space's units; None: the task's fixed evaluation instances.
         simulators: lends the simulator; None: a new one.
+        observe: see `play`; the slots that it gets are those of one of the `portions` of the instances.
     """
     instances = task.evaluation_instances() if instances is None else instances
     lender = Simulators(task) if simulators is None else simulators
     parts = []
     for part in portions(len(instances), task):
         with lender.lend(len(part)) as simulator:
-            parts.append(_play(Episodes(task, len(part), tradeoff, simulator), policy, instances[part]))
+            parts.append(_play(Episodes(task, len(part), tradeoff, simulator), policy, instances[part], observe))
     return Evaluation(
         **{field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Evaluation)}
     )
 
 
-def _play(episodes: Episodes, policy: Behaviour, instances: Floats) -> Evaluation:
+def _play(episodes: Episodes, policy: Behaviour, instances: Floats, observe: Observe | None) -> Evaluation:
     """Run one episode on each of `instances` (N, I) in the first slots of `episodes`."""
     task, count = episodes.task, len(instances)
     returns, lengths, effort = np.zeros(count), np.zeros(count), np.zeros(count)
-    for turn in play(episodes, policy, instances):
+    controls = np.zeros((count, task.horizon, task.control_space.size))
+    for turn in play(episodes, policy, instances, observe):
         if turn.step:
             returns[turn.slots] += turn.reward
             lengths[turn.slots] += 1
             effort[turn.slots] += task.effort(turn.controls)
+            controls[turn.slots, turn.step - 1] = turn.controls
     return Evaluation(
         instances=instances,
         designs=episodes.designs[:count],
@@ -96,6 +102,7 @@ def _play(episodes: Episodes, policy: Behaviour, instances: Floats) -> Evaluatio
         outcomes=episodes.simulator.outcome[:count].copy(),
         material=task.material(episodes.designs[:count]),
         effort=effort / np.maximum(lengths, 1.0),
+        controls=controls,
     )
 
 

@@ -19,6 +19,7 @@ from typing import Annotated, Any
 import numpy as np
 from joblib import Parallel, delayed
 
+from codesign_bench.cell.cell import Cell
 from codesign_bench.config.validation import check_values
 from codesign_bench.config.values import Within
 from codesign_bench.console import Log
@@ -138,7 +139,7 @@ def measure_cell(
     count = len(controller.instances)
     missing = [index for index in range(count if instances is None else min(instances, count)) if index not in done]
     if missing:
-        log(f"trying other tools on {len(missing)} instances of {_name(cell)}; kept in {path}")
+        log(f"trying other tools on {len(missing)} instances of {name_of(cell)}; kept in {path}")
         tools = controller.designs()
         calls = (delayed(_measure)(folder, policy_name, tools, index, budget) for index in missing)
         try:
@@ -288,6 +289,6 @@ def _refuse_other(path: Path, rows: list[dict[str, Any]], wanted: dict[str, Any]
         raise UserError(f"{path} was measured otherwise ({'; '.join(sorted(found))}); choose another --results folder")
 
 
-def _name(cell: StoredCell) -> str:
-    record = cell.record
-    return f"{record.task}/{record.method}/{record.variant.name}/seed-{record.seed:02d}"
+def name_of(cell: StoredCell) -> str:
+    """Return a cell's identifier, its path below a results folder."""
+    return Cell(cell.record.task, cell.record.method, cell.record.seed, cell.record.variant).name

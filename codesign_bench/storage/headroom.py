@@ -52,6 +52,19 @@ def rows_of(path: Path) -> list[dict[str, Any]]:
     )
 
 
+def of_cell(results: Path, record: CellRecord, policy: str) -> pd.DataFrame | None:
+    """Return the table of a cell if it was measured with this policy on this version of the task, else None.
+
+    Raises:
+        UnusableFile: it cannot be used.
+    """
+    table = read_table(path_of(results, record), HEADROOM.form)
+    if table is None:
+        return None
+    own = (table["policy"] == policy) & (table["task_version"] == record.task_version)
+    return table[own].reset_index(drop=True)
+
+
 def add_row(results: Path, path: Path, row: Mapping[str, Any]) -> None:
     """Add the row of an instance to a table, in order of instances, unless the table has one by now.
 

@@ -5,6 +5,7 @@ OUT/design_sensitivity/<task>.csv                          many tools on many go
 OUT/outside_region/<task>-<method>[-<variant>].csv         policies around the training region
 OUT/cutout_regions/<task>-<method>.csv                     policies with and without a cutout, on each region
 OUT/deployment/<task>/protocol*.csv                        trials on an arm
+OUT/best_known/<task>.csv                                  the best episodes that are known of every instance
 OUT/headroom/<task>-<method>[-<variant>]-seed-00.csv       other tools under a policy's controller
 """
 
@@ -164,6 +165,25 @@ HEADROOM = Measurements(
         unique=("instance",),
     ),
 )
+BEST_KNOWN_EPISODES = Measurements(
+    "best_known/*.csv",
+    Form(
+        {
+            "task": TEXT,
+            "task_version": WHOLE,
+            "instance": WHOLE,
+            "return": NUMBER,
+            "success": SHARE,
+            "episode_length": WHOLE,
+            "source": TEXT,
+            "searched": WHOLE,
+            "plan": TEXT,
+            "instance_*": NUMBER,
+            "design_*": NUMBER,
+        },
+        unique=("instance", "success"),
+    ),
+)
 ALL = (
     REFERENCE_POINTS,
     REFERENCE_INSTANCES,
@@ -172,6 +192,7 @@ ALL = (
     CUTOUT_REGIONS,
     DEPLOYMENT,
     HEADROOM,
+    BEST_KNOWN_EPISODES,
 )
 
 

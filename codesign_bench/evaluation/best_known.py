@@ -40,6 +40,9 @@ from codesign_bench.task.simulators import Simulators
 SEARCH, SCRIPT = "search", "script"
 """Who found an episode, if it was no cell."""
 
+SAME = 1e-6
+"""Relative difference of returns below which a stored one is not worth playing again: it may be one of rounding."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
@@ -80,7 +83,7 @@ class Update:
         """Play a behaviour on instances (b,), and return the plans (b, X) that it made of them."""
         found = evaluate(self.task, behaviour, instances=self.instances[indices], simulators=self.simulators)
         self.env_steps += int(found.lengths.sum()) + len(indices)
-        return plans_of(self.task, found)
+        return plans_of(found)
 
     def judge(self, plans: Singles, indices: Slots, source: str) -> list[Episode]:
         """Play plans (b, X) on instances (b,) and return the episodes."""
@@ -134,7 +137,8 @@ def update(
     stored = [cell for cell in own if cell.has_policy]
     for cell in stored:
         _take_from(cell, results, state, log)
-    store(results, task, state.known)
+    if state.known.episodes:
+        store(results, task, state.known)
     better, many = len(state.improved), len(everywhere)
     without = f"; {len(own) - len(stored)} cells have none" if len(own) > len(stored) else ""
     log(f"{task.name}: better episodes of {better} of {many} instances by {len(stored)} policies at hand{without}")
@@ -191,7 +195,9 @@ def _promising(state: Update, indices: Iterable[int], returns: Iterable[float], 
     nothing = np.zeros(0, dtype=np.float32)
     return np.array(
         [
-            Episode(index, earned, success == 1.0, 0, "", nothing).adds_to(state.known.episodes.get(index, []))
+            Episode(index, earned - SAME * max(1.0, abs(earned)), success == 1.0, 0, "", nothing).adds_to(
+                state.known.episodes.get(index, [])
+            )
             for index, earned, success in zip(indices, returns, successes, strict=True)
         ],
         dtype=bool,

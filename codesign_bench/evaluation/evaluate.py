@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from codesign_bench.task import Behaviour, Booleans, Floats, Task
+from codesign_bench.task import Behaviour, Booleans, Floats, Singles, Task
 from codesign_bench.task.episodes import Episodes, Tradeoff, portions
 from codesign_bench.task.play import Observe, play
 from codesign_bench.task.simulators import Simulators
@@ -37,6 +37,8 @@ class Evaluation:
     """(N,) the task's outcome at the end."""
     effort: Floats
     """(N,) mean c_used / c_max of equation 1 over the episode."""
+    unit_designs: Singles
+    """(N, D) the designs in [-1, 1], as they were played."""
     controls: Floats
     """(N, H, C) in [-1, 1]; zero after the end of an episode."""
 
@@ -102,6 +104,7 @@ def _play(episodes: Episodes, policy: Behaviour, instances: Floats, observe: Obs
         outcomes=episodes.simulator.outcome[:count].copy(),
         material=task.material(episodes.designs[:count]),
         effort=effort / np.maximum(lengths, 1.0),
+        unit_designs=episodes.observation[:count, episodes.layout.design].copy(),
         controls=controls,
     )
 

@@ -44,11 +44,10 @@ def parts_of(task: Task, plans: Singles) -> tuple[Singles, Singles]:
     return plans[:, :size], plans[:, size:].reshape(len(plans), task.horizon, task.control_space.size)
 
 
-def plans_of(task: Task, evaluation: Evaluation) -> Singles:
+def plans_of(evaluation: Evaluation) -> Singles:
     """Return the plans (N, X) of episodes that were played, in single precision, as policies act."""
-    designs = task.design_space.to_unit(evaluation.designs)
-    controls = evaluation.controls.reshape(len(designs), -1)
-    return np.concatenate([designs, controls], axis=1).astype(np.float32)
+    controls = evaluation.controls.astype(np.float32).reshape(len(evaluation.controls), -1)
+    return np.concatenate([evaluation.unit_designs, controls], axis=1)
 
 
 def replay(task: Task, plans: Singles, instances: Floats, simulators: Simulators | None = None) -> Evaluation:

@@ -18,8 +18,9 @@ from codesign_bench.errors import UserError
 from codesign_bench.storage.files import saying_why
 from codesign_bench.storage.layout import open_folder
 from codesign_bench.storage.locks import locked
-from codesign_bench.storage.measurements import HEADROOM, usable_tables
+from codesign_bench.storage.measurements import HEADROOM, REFERENCE_INSTANCES, usable, usable_tables
 from codesign_bench.storage.records import CellRecord
+from codesign_bench.storage.reference_points import BEST_KNOWN, INSTANCES_FILE
 from codesign_bench.storage.tables import read_table, write_table
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 FOLDER = "headroom"
 TOOLS = ("designer", "best", "other", "random")
 """Whose tool: the designer's own, the best that was found, the designer's best for another goal, a random one."""
+KNOWN = "known"
+"""The best that is known of an instance, whoever did it."""
 QUANTITIES = ("return", "success")
 LOCK_SECONDS = 60.0
 """Longest wait for another process that is writing a table."""
@@ -89,6 +92,9 @@ def add_row(results: Path, path: Path, row: Mapping[str, Any]) -> None:
 def load_headroom(results: Path) -> pd.DataFrame:
     """Return what was measured of all cells, one row per cell and instance.
 
+    Columns: those of the tables, then known_return and known_success, the best known of the instance among the folder's
+    reference points, NaN where there is none of this version of the task.
+
     Raises:
         UserError: nothing is measured yet.
     """
@@ -97,4 +103,11 @@ def load_headroom(results: Path) -> pd.DataFrame:
     tables = usable_tables(results, HEADROOM)
     if not tables:
         raise UserError(f"not measured yet; measure it with: codesign-bench headroom --policy CELL --results {results}")
-    return pd.concat(tables, ignore_index=True)
+    table = pd.concat(tables, ignore_index=True)
+    points = usable(results / INSTANCES_FILE, REFERENCE_INSTANCES)
+    if points is None:
+        return table.assign(known_return=float("nan"), known_success=float("nan"))
+    known = points[points["point"] == BEST_KNOWN]
+    keys = ["task", "task_version", "instance"]
+    renamed = known[[*keys, *QUANTITIES]].rename(columns={name: f"{KNOWN}_{name}" for name in QUANTITIES})
+    return table.merge(renamed, on=keys, how="left", validate="many_to_one")

@@ -181,7 +181,7 @@ BEST_KNOWN_EPISODES = Measurements(
             "instance_*": NUMBER,
             "design_*": NUMBER,
         },
-        unique=("instance", "success"),
+        unique=("success", "instance"),
     ),
 )
 ALL = (

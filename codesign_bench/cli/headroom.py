@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=OfKind(Jobs),
         default=1,
         metavar="N",
-        help="processes that try tools side by side; default: 1; --update needs one",
+        help="processes that try tools side by side; default: 1; --update uses one",
     )
 
 

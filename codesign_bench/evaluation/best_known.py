@@ -25,7 +25,7 @@ from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.evaluation.headroom import DESIGNER, fingerprint, name_of
-from codesign_bench.evaluation.plans import parts_of, plans_of, replay
+from codesign_bench.evaluation.plans import parts_of, plan_size, plans_of, replay
 from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
 from codesign_bench.seeding import generator
 from codesign_bench.storage.best_known import BestKnown, Episode, load_best_known, store
@@ -229,7 +229,7 @@ def _search(results: Path, state: Update, search: Search, log: Log, instances: i
 
 
 def _neighbours(state: Update, count: int) -> list[Slots]:
-    """Return the nearest other instances of each, in a space where every entry has the range [-1, 1]."""
+    """Return the nearest other instances of each; every entry of an instance is scaled by its range among them."""
     places = np.asarray(state.instances, dtype=np.float64)
     low, high = places.min(axis=0), places.max(axis=0)
     places = (places - low) / np.where(high > low, high - low, 1.0)
@@ -243,7 +243,7 @@ def _tried(state: Update, index: int, near: Slots, search: Search, rng: np.rando
     starts = [episode.plan for other in (index, *near) if (episode := state.known.best(int(other))) is not None]
     base = _Bent(state.task, search.knots)
     if not starts:
-        starts = [rng.uniform(-1.0, 1.0, base.plan_size).astype(np.float32)]
+        starts = [rng.uniform(-1.0, 1.0, plan_size(state.task)).astype(np.float32)]
     best = None
     for episode in state.judge(np.stack(starts), np.full(len(starts), index), SEARCH):
         best = episode if best is None or episode.earned > best.earned else best
@@ -273,11 +273,6 @@ class _Bent:
         places = np.linspace(0.0, task.horizon - 1.0, self.knots)
         self.weights = np.stack([np.interp(steps, places, unit) for unit in np.eye(self.knots)], axis=1)
         """(H, K) what a change at each knot is at each step."""
-
-    @property
-    def plan_size(self) -> int:
-        """X."""
-        return self.task.design_space.size + self.task.horizon * self.task.control_space.size
 
     @property
     def size(self) -> int:

@@ -15,11 +15,15 @@ from codesign_bench.cell.grid import grid
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.config.settings import Sourced, StoredConfig
 from codesign_bench.errors import UserError
+from codesign_bench.evaluation.evaluate import evaluate, rows
+from codesign_bench.method import Array, load_method
 from codesign_bench.storage.cells import table_checksums
 from codesign_bench.storage.layout import CURVE_COLUMNS, CURVE_FILE, EVALUATION_FILE, write_rows
+from codesign_bench.storage.policies import save_policy
 from codesign_bench.storage.records import DONE, CellRecord
 from codesign_bench.storage.tables import Content, Measurements
 from codesign_bench.sweep.runner import run_sweep
+from codesign_bench.task import load_task
 
 Part = TypeVar("Part")
 
@@ -78,6 +82,21 @@ def store_cell(
     record = {"label": method, "profile": "quick", "config": BUDGET, **fields}
     record |= {"checksums": table_checksums(folder)} if finished else {}
     CellRecord(task=task, method=method, seed=seed, variant=variant, status=status, **record).write(folder)
+    return folder
+
+
+def store_played_cell(out: Path, task: str, method: str, tensors: Mapping[str, Array], **fields: Any) -> Path:
+    """Write a finished cell whose policy has these tensors, with its evaluation, as if it had been trained.
+
+    Its method has its default settings; `fields` are further ones of `store_cell`.
+    """
+    config, loaded = StoredConfig(BUDGET.run, {}), load_task(task)
+    policy = load_method(method).make_policy(loaded, load_method(method).config_class(), tensors)
+    evaluation = evaluate(loaded, policy)
+    given = {"config": config, "task_version": loaded.version, **fields}
+    curve = [{"env_steps": 100, **evaluation.summary}]
+    folder = store_cell(out, task=task, method=method, curve=curve, evaluation=list(rows(loaded, evaluation)), **given)
+    save_policy(folder, policy, {})
     return folder
 
 

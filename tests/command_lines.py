@@ -52,6 +52,7 @@ REQUIRED = {
     "deploy": ("--policy", "nowhere"),
     "export": ("--policy", "nowhere", "--out", "new"),
     "reference": ("--task", "push"),
+    "headroom": ("--update",),
     "bench sweep": ("--task", "push", "--method", "cma_es"),
 }
 """What each command needs before anything else can be wrong; others need nothing."""

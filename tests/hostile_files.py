@@ -71,6 +71,8 @@ TABLES: Mapping[str, str] = {
     "outside_region/toy_reach-toy_search.csv": "return",
     "cutout_regions/toy_reach-toy_search.csv": "return",
     "deployment/toy_reach/protocol.csv": "outcome",
+    "headroom/toy_reach-toy_search-seed-00.csv": "best_return",
+    "best_known/toy_reach.csv": "return",
 }
 """Tables beside the cells, each with a column of numbers."""
 

@@ -32,6 +32,8 @@ class Axis:
     """Help of the option, in one line."""
     exclusive: ClassVar[str] = ""
     """Axes with the same word here are never varied together; a grid contains each separately."""
+    keeps_returns: ClassVar[bool] = True
+    """Whether cells are still judged by the task's own reward, on its evaluation instances."""
 
     def check(self, value: Value, task: Task) -> None:
         """Check that a value is of the axis's kind, and possible on `task`.
@@ -86,6 +88,7 @@ class Alpha(Axis):
     kind = Share
     metavar = "A"
     help = "add the trade-off reward with coefficient A"
+    keeps_returns = False
 
     def problem(self, problem: Problem, value: Value, run: RunSettings) -> Problem:
         """Add the trade-off reward."""
@@ -104,6 +107,7 @@ class _OnePlace(Axis):
     kind = Annotated[int, Within(1, 10_000)]
     metavar = "N"
     exclusive = "instance"
+    keeps_returns = False
 
     def check(self, value: Value, task: Task) -> None:
         """Check that the task has a place with this number."""
@@ -148,6 +152,7 @@ class _OfTuning(Axis):
 
     kind = Annotated[int, Within(0, 1_000_000)]
     metavar = "N"
+    keeps_returns = False
 
     def overrides(self, value: Value) -> tuple[str, ...]:
         """Keep the cell from being reported, and evaluate it no more often than the search needs."""
@@ -186,6 +191,17 @@ def axis_named(name: str) -> Axis:
     if name not in known:
         raise unknown_name("axis", name, known)
     return known[name]
+
+
+def keeps_returns(variant: Variant) -> bool:
+    """Return whether cells of a variant are judged by the task's own reward, on its evaluation instances.
+
+    Of an axis that is not known here, nothing is known, so the answer is no.
+    """
+    try:
+        return all(axis_named(axis).keeps_returns for axis, _ in variant)
+    except UserError:
+        return False
 
 
 def axes() -> dict[str, Axis]:

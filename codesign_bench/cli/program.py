@@ -41,6 +41,7 @@ COMMANDS = (
     "report",
     "reproduce",
     "reference",
+    "headroom",
     "render",
     "deploy",
     "export",

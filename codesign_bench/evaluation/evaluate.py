@@ -1,6 +1,6 @@
 """Evaluate a policy on a task's fixed evaluation instances, acting with its means.
 
-Shapes: `N` evaluation instances, `I` instance, `D` design.
+Shapes: `N` evaluation instances, `I` instance, `D` design, `H` horizon, `C` control.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from codesign_bench.task import Behaviour, Booleans, Floats, Task
+from codesign_bench.task import Behaviour, Booleans, Floats, Singles, Task
 from codesign_bench.task.episodes import Episodes, Tradeoff, portions
-from codesign_bench.task.play import play
+from codesign_bench.task.play import Observe, play
 from codesign_bench.task.simulators import Simulators
 
 
@@ -37,6 +37,10 @@ class Evaluation:
     """(N,) the task's outcome at the end."""
     effort: Floats
     """(N,) mean c_used / c_max of equation 1 over the episode."""
+    unit_designs: Singles
+    """(N, D) the designs in [-1, 1], as they were played."""
+    controls: Floats
+    """(N, H, C) in [-1, 1]; zero after the end of an episode."""
 
     @property
     def summary(self) -> dict[str, float]:
@@ -57,6 +61,7 @@ def evaluate(
     tradeoff: Tradeoff | None = None,
     instances: Floats | None = None,
     simulators: Simulators | None = None,
+    observe: Observe | None = None,
 ) -> Evaluation:
     """Run one episode of `policy` on each of `instances`.
 
@@ -66,10 +71,11 @@ def evaluate(
         tradeoff: added to the task's reward if given.
         instances: (N, I) in the instance space's units; None: the task's fixed evaluation instances.
         simulators: lend the simulator, and share the work if they use several cores; None: new ones, on one core.
+        observe: see `play`; the slots that it gets are those of one of the `portions` of the instances. Needs one core.
     """
     instances = task.evaluation_instances() if instances is None else instances
     shared = Simulators(task) if simulators is None else simulators
-    plays = [_Play(policy, tradeoff, instances[part]) for part in portions(len(instances), task)]
+    plays = [_Play(policy, tradeoff, instances[part], observe) for part in portions(len(instances), task)]
     parts = shared.share(_Play.run, plays)
     return Evaluation(
         **{field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Evaluation)}
@@ -83,6 +89,7 @@ class _Play:
     policy: Behaviour
     tradeoff: Tradeoff | None
     instances: Floats
+    observe: Observe | None
 
     @staticmethod
     def run(simulators: Simulators, play: _Play) -> Evaluation:
@@ -90,18 +97,20 @@ class _Play:
         count = len(play.instances)
         with simulators.lend(count) as simulator:
             episodes = Episodes(simulators.task, count, play.tradeoff, simulator)
-            return _play(episodes, play.policy, play.instances)
+            return _play(episodes, play.policy, play.instances, play.observe)
 
 
-def _play(episodes: Episodes, policy: Behaviour, instances: Floats) -> Evaluation:
+def _play(episodes: Episodes, policy: Behaviour, instances: Floats, observe: Observe | None) -> Evaluation:
     """Run one episode on each of `instances` (N, I) in the first slots of `episodes`."""
     task, count = episodes.task, len(instances)
     returns, lengths, effort = np.zeros(count), np.zeros(count), np.zeros(count)
-    for turn in play(episodes, policy, instances):
+    controls = np.zeros((count, task.horizon, task.control_space.size))
+    for turn in play(episodes, policy, instances, observe):
         if turn.step:
             returns[turn.slots] += turn.reward
             lengths[turn.slots] += 1
             effort[turn.slots] += task.effort(turn.controls)
+            controls[turn.slots, turn.step - 1] = turn.controls
     return Evaluation(
         instances=instances,
         designs=episodes.designs[:count],
@@ -111,6 +120,8 @@ def _play(episodes: Episodes, policy: Behaviour, instances: Floats) -> Evaluatio
         outcomes=episodes.simulator.outcome[:count].copy(),
         material=task.material(episodes.designs[:count]),
         effort=effort / np.maximum(lengths, 1.0),
+        unit_designs=episodes.observation[:count, episodes.layout.design].copy(),
+        controls=controls,
     )
 
 

@@ -8,7 +8,7 @@ Shapes: `N` evaluation instances, `I` instance, `K` tools, `D` design.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +22,7 @@ from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.evaluation.sensitivity import GOALS, RANDOM_TOOLS, play_tools, stored_table, tools_of
 from codesign_bench.registry import in_order
 from codesign_bench.seeding import generator
+from codesign_bench.storage.best_known import load_best_known
 from codesign_bench.storage.cells import StoredCell, find_cells
 from codesign_bench.storage.measurements import REFERENCE_INSTANCES, REFERENCE_POINTS
 from codesign_bench.storage.reading import UnusableFile
@@ -110,18 +111,36 @@ def best_known(task: Task, points: Sequence[Point], results: Path) -> Point:
     Args:
         task: whose instances they are.
         points: what was measured.
-        results: its finished cells that vary nothing count, too, if they were judged on the same instances.
+        results: its best known episodes count, too, and its finished cells that vary nothing, if they were judged on
+            the same instances.
+
+    Raises:
+        UnusableFile: the table of best known episodes cannot be used.
     """
-    cells = list(_cells(task, results))
+    cells, episodes = list(_cells(task, results)), _episodes(task, results)
+    points = [*points, *episodes]
     returns = np.array([*(point.returns for point in points), *(table["return"] for _, table in cells)])
     successes = np.array([*(point.successes for point in points), *(table["success"] for _, table in cells)])
     names = [[point.sources[i] if point.sources else point.name for point in points] for i in range(returns.shape[1])]
     sources = [[*own, *(name for name, _ in cells)] for own in names]
     # The best single tool is one of those that `ANY_TOOL` counts.
     tools = sum(point.tools if point.name == ANY_TOOL else 1 for point in points if point.name != SINGLE_TOOL)
-    told = f"the highest of every instance, {len(cells)} cells among them"
+    told = f"the highest of every instance, {len(cells)} cells{' and stored episodes' * len(episodes)} among them"
     best = [own[winner] for own, winner in zip(sources, returns.argmax(axis=0), strict=True)]
     return Point(BEST_KNOWN, returns.max(axis=0), successes.max(axis=0), tools + len(cells), told, best)
+
+
+def _episodes(task: Task, results: Path) -> list[Point]:
+    """Return what the best known episodes of the folder reach, as one point; none where there are no episodes."""
+    known = load_best_known(results, task).episodes
+    if not known:
+        return []
+    count = task.num_evaluation_instances
+    returns, successes, sources = np.full(count, -np.inf), np.zeros(count), [BEST_KNOWN] * count
+    for instance, episodes in known.items():
+        returns[instance], sources[instance] = episodes[0].earned, episodes[0].source
+        successes[instance] = max(episode.solved for episode in episodes)
+    return [Point(BEST_KNOWN, returns, successes, 1, "stored episodes", sources)]
 
 
 def measure_missing(results: Path, tasks: Iterable[str], log: Log, *, again: bool = False, jobs: int = 1) -> None:
@@ -144,9 +163,26 @@ def measure_missing(results: Path, tasks: Iterable[str], log: Log, *, again: boo
         if not points:
             log(f"playing the reference points of {name}; kept in {results / FILE}")
             points = measure(task, jobs=jobs, tried=None if again else stored_table(results, name))
-        points.append(best_known(task, points, results))
-        new = {FILE: summary_table(task, points), INSTANCES_FILE: instance_table(task, points)}
-        write_tables(results, {results / file: _replaced(known[file], name, table) for file, table in new.items()})
+        _write(results, task, known, points)
+
+
+def renew_best_known(results: Path, task: Task) -> bool:
+    """Renew the best known of a task whose points were measured; return whether they were.
+
+    Raises:
+        UserError: the folder cannot be written, or what it has cannot be used.
+    """
+    known, points = _known(results), _stored(task, results)
+    if points:
+        _write(results, task, known, points)
+    return bool(points)
+
+
+def _write(results: Path, task: Task, known: Mapping[str, pd.DataFrame | None], points: Sequence[Point]) -> None:
+    """Replace the points of a task in both tables, and add the best known."""
+    points = [*points, best_known(task, points, results)]
+    new = {FILE: summary_table(task, points), INSTANCES_FILE: instance_table(task, points)}
+    write_tables(results, {results / file: _replaced(known[file], task.name, table) for file, table in new.items()})
 
 
 def summary_table(task: Task, points: Sequence[Point]) -> pd.DataFrame:

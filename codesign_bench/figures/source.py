@@ -64,6 +64,13 @@ def design_sensitivity(request: Request) -> pd.DataFrame:
     return load_sensitivity(request.results)
 
 
+def headroom(request: Request) -> pd.DataFrame:
+    """Return what other tools earn with the controllers of finished cells, and the best that is known."""
+    from codesign_bench.storage.headroom import load_headroom
+
+    return load_headroom(request.results)
+
+
 def timing(request: Request) -> pd.DataFrame:
     """Return the training times of cells and the inference times of their policies."""
     from codesign_bench.evaluation.timing import timing_frame

@@ -45,9 +45,11 @@ class EvolutionConfig:
 
 
 class Evolution:
-    """Maximises a fitness over [-1, 1]^X, generation by generation."""
+    """Maximises a fitness over [-1, 1]^X, generation by generation, from `start` (X,) or the centre."""
 
-    def __init__(self, size: int, config: EvolutionConfig, rng: np.random.Generator) -> None:
+    def __init__(
+        self, size: int, config: EvolutionConfig, rng: np.random.Generator, start: Floats | None = None
+    ) -> None:
         own = rng.spawn(1)[0]  # a separate generator, so that other draws do not shift the numbers of a replay
         options = {
             "popsize": config.popsize,
@@ -63,7 +65,11 @@ class Evolution:
             "verb_log": 0,
             "verb_disp": 0,
         }
-        self._strategy = cma.CMAEvolutionStrategy(np.zeros(size), config.sigma0, options)
+        self._size = size
+        # pycma fails in one dimension, so a second number is searched that nothing depends on.
+        first = np.zeros(max(2, size))
+        first[:size] = 0.0 if start is None else np.clip(start, -1.0, 1.0)
+        self._strategy = cma.CMAEvolutionStrategy(first, config.sigma0, options)
         self.sigma0 = config.sigma0
         self._asked: list[Any] | None = None
         self.history: list[list[float]] = []
@@ -72,7 +78,7 @@ class Evolution:
         """Return the candidates (P, X) of the current generation; a second call before `tell` returns the same."""
         if self._asked is None:
             self._asked = self._strategy.ask()
-        return np.array(self._asked)
+        return np.array(self._asked)[:, : self._size]
 
     def tell(self, fitness: Floats) -> None:
         """End the generation with the fitness (P,) of its candidates; larger is better."""
@@ -85,7 +91,7 @@ class Evolution:
     @property
     def mean(self) -> Floats:
         """The mean (X,) of the search distribution, inside the bounds."""
-        return np.array(self._strategy.result.xfavorite)
+        return np.array(self._strategy.result.xfavorite)[: self._size]
 
     @property
     def sigma(self) -> float:

@@ -7,18 +7,22 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from codesign_bench.cell.axes import axis_named
+from codesign_bench.cell.axes import axis_named, keeps_returns
 from codesign_bench.cell.variant import DEFAULT_NAME, FIRST_AXES, Value, Variant, in_axis_order
 from codesign_bench.config.values import plain_type
 from codesign_bench.errors import UserError
+from codesign_bench.stats.normalization import normalized_score
 from codesign_bench.storage.cells import StoredCell, reported_cells
 from codesign_bench.storage.reading import UnusableFile
+from codesign_bench.storage.reference_points import stored_references
 from codesign_bench.storage.survey import survey
 from codesign_bench.visible_text import on_one_line
 
 if TYPE_CHECKING:  # pandas takes a second to import; cell processes do not need it
     import pandas as pd
 
+SCORE_COLUMN = "normalized_score"
+"""Column with the return on the scale of its task's reference points, the last of a frame."""
 LABEL_COLUMN = "label"
 """Column with the method's name in figures; the other columns identify the cell."""
 
@@ -33,7 +37,9 @@ def load_results(out: str | Path) -> pd.DataFrame:
     Cells of tuning, which are evaluated on validation instances, are left out.
 
     Columns: task, method, variant, one for each axis (cutout, alpha, finetune, scratch, and any other axis of a cell;
-    NaN where it is not varied), seed, label, then those of `curve.csv`.
+    NaN where it is not varied), seed, label, those of `curve.csv`, then normalized_score: `return_mean` on the scale of
+    the folder's reference points, 0 for a random tool held still and 1 for the best known. It is NaN where the folder
+    has no points of this version of the task, and in variants with another reward or other instances.
 
     Files that cannot be used are left out, with a warning that names each and its reason.
 
@@ -56,7 +62,7 @@ def stored_curves(out: str | Path) -> pd.DataFrame:
     parts = _tables_of(reported_cells(Path(out)), StoredCell.curve)
     if not parts:
         raise UserError(f"no results in '{out}' yet; create some with: codesign-bench run --out {out}")
-    frame = pd.concat(_with_cell_columns(parts), ignore_index=True)
+    frame = pd.concat(_with_cell_columns(Path(out), parts, "return_mean"), ignore_index=True)
     return frame.astype({"seed": int, "env_steps": int})
 
 
@@ -64,8 +70,9 @@ def load_evaluations(out: str | Path) -> pd.DataFrame:
     """Return the final result of every finished cell below `out` on each evaluation instance, as one tidy frame.
 
     Columns: those of `load_results` up to `label`, then `instance` (its number), `instance_<name>` and `design_<name>`
-    in the task's units (NaN for the entries of other tasks), return, success, episode_length, material, effort, and
-    in_cutout if the task has positions.
+    in the task's units (NaN for the entries of other tasks), return, success, episode_length, material, effort,
+    in_cutout if the task has positions, and normalized_score, as in `load_results`, of the return. Its mean over
+    instances is the score of the mean return; of a single instance it may be above 1.
 
     Raises:
         UserError: the folder does not exist or contains no finished cell.
@@ -76,7 +83,7 @@ def load_evaluations(out: str | Path) -> pd.DataFrame:
     if not parts:
         raise UserError(f"no finished cell in '{out}' yet; create some with: codesign-bench run --out {out}")
     numbered = [(cell, _in_front({"instance": range(len(table))}, table)) for cell, table in parts]
-    return pd.concat(_with_cell_columns(numbered), ignore_index=True).astype({"seed": int})
+    return pd.concat(_with_cell_columns(Path(out), numbered, "return"), ignore_index=True).astype({"seed": int})
 
 
 def default_rows(frame: pd.DataFrame) -> pd.DataFrame:
@@ -119,8 +126,12 @@ def require_columns(frame: pd.DataFrame, columns: Sequence[str], what: str) -> N
         raise UserError(f"{what} have no rows")
 
 
-def _with_cell_columns(parts: Sequence[tuple[StoredCell, pd.DataFrame]]) -> list[pd.DataFrame]:
-    """Insert the columns that identify each cell before its table's columns; all tables get the same axes."""
+def _with_cell_columns(out: Path, parts: Sequence[tuple[StoredCell, pd.DataFrame]], earned: str) -> list[pd.DataFrame]:
+    """Insert the columns that identify each cell before its table's columns, and the score of `earned` behind them.
+
+    All tables get the same axes.
+    """
+    scales = stored_references(out)
     axes = in_axis_order({*FIRST_AXES, *(axis for cell, _ in parts for axis, _ in cell.record.variant)})
     result = []
     for cell, table in parts:
@@ -133,7 +144,9 @@ def _with_cell_columns(parts: Sequence[tuple[StoredCell, pd.DataFrame]]) -> list
             "seed": record.seed,
             LABEL_COLUMN: record.label,
         }
-        result.append(_in_front(columns, table))
+        known = _in_front(columns, table)
+        scale = scales.get((record.task, record.task_version)) if keeps_returns(record.variant) else None
+        result.append(known.assign(**{SCORE_COLUMN: normalized_score(known[earned], scale)}))
     return result
 
 

@@ -5,6 +5,8 @@ OUT/design_sensitivity/<task>.csv                          many tools on many go
 OUT/outside_region/<task>-<method>[-<variant>].csv         policies around the training region
 OUT/cutout_regions/<task>-<method>.csv                     policies with and without a cutout, on each region
 OUT/deployment/<task>/protocol*.csv                        trials on an arm
+OUT/best_known/<task>.csv                                  the best episodes that are known of every instance
+OUT/headroom/<task>-<method>[-<variant>]-seed-00.csv       other tools under a policy's controller
 """
 
 from __future__ import annotations
@@ -130,7 +132,68 @@ DEPLOYMENT = Measurements(
         alike=("kind", "tool"),
     ),
 )
-ALL = (REFERENCE_POINTS, REFERENCE_INSTANCES, DESIGN_SENSITIVITY, OUTSIDE_REGION, CUTOUT_REGIONS, DEPLOYMENT)
+HEADROOM = Measurements(
+    "headroom/*.csv",
+    Form(
+        {
+            "task": TEXT,
+            "task_version": WHOLE,
+            "method": TEXT,
+            "variant": TEXT,
+            "seed": WHOLE,
+            "label": TEXT,
+            "policy": TEXT,
+            "instance": WHOLE,
+            "designer_return": NUMBER,
+            "designer_success": SHARE,
+            "best_return": NUMBER,
+            "best_success": SHARE,
+            "other_return": NUMBER,
+            "other_success": SHARE,
+            "random_return": NUMBER,
+            "random_success": SHARE,
+            "found_by": TEXT,
+            "env_steps": WHOLE,
+            "candidates": WHOLE,
+            "popsize": WHOLE,
+            "sigma0": NUMBER,
+            "random_tools": WHOLE,
+            "other_tools": WHOLE,
+            "instance_*": NUMBER,
+            "design_*": NUMBER,
+        },
+        unique=("instance",),
+    ),
+)
+BEST_KNOWN_EPISODES = Measurements(
+    "best_known/*.csv",
+    Form(
+        {
+            "task": TEXT,
+            "task_version": WHOLE,
+            "instance": WHOLE,
+            "return": NUMBER,
+            "success": SHARE,
+            "episode_length": WHOLE,
+            "source": TEXT,
+            "searched": WHOLE,
+            "plan": TEXT,
+            "instance_*": NUMBER,
+            "design_*": NUMBER,
+        },
+        unique=("success", "instance"),
+    ),
+)
+ALL = (
+    REFERENCE_POINTS,
+    REFERENCE_INSTANCES,
+    DESIGN_SENSITIVITY,
+    OUTSIDE_REGION,
+    CUTOUT_REGIONS,
+    DEPLOYMENT,
+    HEADROOM,
+    BEST_KNOWN_EPISODES,
+)
 
 
 def paths_of(results: Path, kind: Measurements) -> list[Path]:

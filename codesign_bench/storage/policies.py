@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from codesign_bench.cell.axes import axis_named
 from codesign_bench.config.resolve import method_config
+from codesign_bench.config.run_settings import RunSettings
 from codesign_bench.errors import ChangedTaskError, UnavailableError, UnknownNameError, UserError
-from codesign_bench.method import Array, Method, Policy, load_method
+from codesign_bench.method import Array, Method, Policy, Problem, load_method
 from codesign_bench.storage.arrays import load_arrays, save_arrays
 from codesign_bench.storage.cells import StoredCell, open_cell
 from codesign_bench.storage.files import reason_of
@@ -96,6 +98,20 @@ def members_of(cell: StoredCell) -> tuple[Task, type[Method[Any]]]:
         return load_task(cell.record.task), load_method(cell.record.method)
     except UnknownNameError as error:
         raise UnknownNameError(f"{cell.folder / CELL_FILE}: {error}") from error
+
+
+def problem_of(cell: StoredCell) -> Problem:
+    """Return the learning problem of a cell, with its reward and its evaluation instances.
+
+    Raises:
+        UserError: an axis of its variant is unknown, or its settings are incompatible with this version.
+    """
+    record = cell.record
+    run: RunSettings = method_config(RunSettings, record.config.run)
+    problem = Problem(members_of(cell)[0], validation=not cell.is_reported)
+    for axis, value in record.variant:
+        problem = axis_named(axis).problem(problem, value, run)
+    return problem
 
 
 def _check_widths(cell: StoredCell) -> None:

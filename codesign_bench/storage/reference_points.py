@@ -57,6 +57,15 @@ def references(points: pd.DataFrame) -> dict[str, Reference]:
     }
 
 
+def stored_references(results: Path) -> dict[tuple[str, int], Reference]:
+    """Return the scales of the tasks in a results folder, by name and version of the scene; none without a table."""
+    table = usable(results / FILE, REFERENCE_POINTS)
+    if table is None:
+        return {}
+    versions = table.groupby("task")["task_version"].unique()
+    return {(task, int(version)): scale for task, scale in references(table).items() for version in versions[task]}
+
+
 def with_reference_points(frame: pd.DataFrame, results: Path) -> pd.DataFrame:
     """Return rows of cells with the reference points of their tasks in columns, where the folder has any.
 

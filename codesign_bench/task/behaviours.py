@@ -15,7 +15,7 @@ from codesign_bench.task.task import Task
 class GivenDesigns(Behaviour):
     """A controller with fixed designs: one per episode, or the same for all."""
 
-    def __init__(self, unit_designs: Floats, controller: Behaviour) -> None:
+    def __init__(self, unit_designs: Floats | Singles, controller: Behaviour) -> None:
         """Take designs in [-1, 1]: (B, D) for B parallel episodes, or one design (D,) for any number of episodes."""
         self.unit_designs, self.controller = unit_designs.astype(np.float32), controller
 

@@ -11,7 +11,7 @@ import pytest
 
 from builders import sweep, toy_cells
 from codesign_bench import load_policy, load_results
-from codesign_bench.cell.axes import axes, axis_named, parse_axis_value
+from codesign_bench.cell.axes import axes, axis_named, keeps_returns, parse_axis_value
 from codesign_bench.cell.cell import Cell, resolve_cell, resolve_cells
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.cli import main
@@ -44,6 +44,18 @@ def trained(tmp_path: Path) -> Path:
     """A results folder with two finished default cells."""
     assert sweep(cells(2, overrides=(*OVERRIDES, "steps=400")), tmp_path)[0] == 0
     return tmp_path
+
+
+def test_cells_keep_their_returns_unless_reward_or_instances_change() -> None:
+    for variant in (DEFAULT, Variant.of(cutout=0.5)):
+        problem = problem_of(variant)
+        assert (problem.tradeoff, problem.instances, keeps_returns(variant)) == (None, None, True)
+    for variant in (Variant.of(alpha=0.3), Variant.of(cutout=0.5, alpha=0.3), *STARTS):
+        problem = problem_of(variant)
+        assert problem.tradeoff is not None or problem.instances is not None
+        assert not keeps_returns(variant)
+    assert not keeps_returns(Variant.of(setting=1)), "judged on validation instances"
+    assert not keeps_returns(Variant.of(somebodys=1)), "of an axis that is not known here"
 
 
 def test_a_cutout_and_a_tradeoff_are_parts_of_the_problem() -> None:

@@ -15,7 +15,16 @@ import pytest
 from builders import sweep, toy_cells
 from codesign_bench import registry
 from codesign_bench.evaluation import reference_points
-from codesign_bench.evaluation.reference_points import Point, best_known, instance_table, measure, measure_missing
+from codesign_bench.evaluation.plans import plan_size
+from codesign_bench.evaluation.reference_points import (
+    Point,
+    best_known,
+    instance_table,
+    measure,
+    measure_missing,
+    renew_best_known,
+)
+from codesign_bench.storage.best_known import BestKnown, Episode, store
 from codesign_bench.storage.reference_points import (
     COLUMNS,
     FILE,
@@ -137,6 +146,36 @@ def test_the_best_known_is_the_highest_of_every_instance(tmp_path: Path) -> None
     assert best.returns.tolist() == [1.0, 5.0, 3.0, 0.0]
     assert best.successes.tolist() == [1.0, 0.0, 1.0, 0.0]
     assert list(best.sources) == ["script", "idle", "script", "idle"]
+
+
+def test_stored_episodes_count_in_return_and_in_success(tmp_path: Path) -> None:
+    task, known = _Scripted(), BestKnown()
+    plan = np.zeros(plan_size(task), dtype=np.float32)
+    for instance, earned, solved in ((1, 9.0, False), (1, 4.0, True), (2, -1.0, False)):
+        known.offer(Episode(instance, earned, solved, 5, "a search", plan))
+    store(tmp_path, task, known)
+    points = [point("idle", [0.0, 5.0, 1.0, 0.0], [0, 0, 1, 0])]
+    best = best_known(task, points, tmp_path)
+    assert best.returns.tolist() == [0.0, 9.0, 1.0, 0.0]
+    assert best.successes.tolist() == [0.0, 1.0, 1.0, 0.0]
+    assert list(best.sources) == ["idle", "a search", "idle", "idle"]
+    assert best.source == "the highest of every instance, 0 cells and stored episodes among them"
+
+
+@pytest.mark.usefixtures("toy")
+def test_points_that_were_measured_are_renewed_alone(tmp_path: Path) -> None:
+    task = load_task("toy_reach")
+    assert not renew_best_known(tmp_path, task), "nothing was measured"
+    measure_missing(tmp_path, ["toy_reach"], [].append)
+    before = load_reference_points(tmp_path).set_index("point")
+    known = BestKnown()
+    for instance in range(task.num_evaluation_instances):
+        known.offer(Episode(instance, 1.0, True, 1, "a search", np.zeros(plan_size(task), dtype=np.float32)))
+    store(tmp_path, task, known)
+    assert renew_best_known(tmp_path, task)
+    after = load_reference_points(tmp_path).set_index("point")
+    assert after.loc["best_known", ["return_mean", "success_rate"]].tolist() == [1.0, 1.0]
+    pd.testing.assert_frame_equal(after.drop(index="best_known"), before.drop(index="best_known"))
 
 
 @pytest.mark.usefixtures("toy")

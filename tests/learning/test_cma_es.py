@@ -50,6 +50,19 @@ def test_larger_is_better_and_candidates_stay_in_the_box() -> None:
     assert evolution.mean.min() > 0.9
 
 
+def test_a_single_parameter_is_searched_too() -> None:
+    evolution = run(make(size=1), 40)
+    assert evolution.ask().shape == (CONFIG.popsize, 1)
+    np.testing.assert_allclose(evolution.mean, OPTIMUM[:1], atol=0.02)
+
+
+def test_it_begins_at_the_start_or_at_the_centre() -> None:
+    narrow, corner = replace(CONFIG, sigma0=1e-6), np.array([0.9, -1.0, 0.0, 1.0, -0.2])
+    begun = Evolution(5, narrow, np.random.default_rng(0), corner).ask()
+    np.testing.assert_allclose(begun, np.tile(corner, (CONFIG.popsize, 1)), atol=1e-4)
+    np.testing.assert_allclose(make(narrow).ask(), 0.0, atol=1e-4)
+
+
 def test_asking_again_before_telling_gives_the_same() -> None:
     evolution = make()
     first = evolution.ask()

@@ -8,13 +8,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from builders import rising, store_cell, sweep, toy_cells
+from builders import rising, store_cell, store_table, sweep, toy_cells
 from codesign_bench import load_results
 from codesign_bench.cell.variant import Variant
 from codesign_bench.errors import UserError
 from codesign_bench.storage.frames import LeftOutWarning, default_rows, load_evaluations, require_columns, rows_varying
 from codesign_bench.storage.layout import CURVE_COLUMNS
+from codesign_bench.storage.measurements import REFERENCE_POINTS
 from codesign_bench.storage.records import RUNNING
+from codesign_bench.storage.reference_points import FILE
 
 VARIANTS = [{}, {"cutout": 0.4}, {"alpha": 0.125}, {"alpha": 1.0}, {"cutout": 0.4, "alpha": 0.3}, {"finetune": 1}]
 
@@ -24,7 +26,16 @@ def test_each_row_identifies_its_cell(tmp_path: Path) -> None:
     store_cell(tmp_path, method="two", seed=4, variant=Variant.of(cutout=0.4), curve=rising(0.0, 1.0), label="Second")
     frame = load_results(tmp_path)
     axes = ["cutout", "alpha", "finetune", "scratch"]
-    assert list(frame.columns) == ["task", "method", "variant", *axes, "seed", "label", *CURVE_COLUMNS]
+    assert list(frame.columns) == [
+        "task",
+        "method",
+        "variant",
+        *axes,
+        "seed",
+        "label",
+        *CURVE_COLUMNS,
+        "normalized_score",
+    ]
     assert frame["method"].tolist() == ["one"] * 3 + ["two"] * 2
     assert frame["label"].tolist() == ["one"] * 3 + ["Second"] * 2
     assert frame["variant"].tolist() == ["default"] * 3 + ["cutout-0.40"] * 2
@@ -32,6 +43,40 @@ def test_each_row_identifies_its_cell(tmp_path: Path) -> None:
     assert frame["env_steps"].tolist() == [0, 100, 200, 0, 100]
     assert frame["cutout"].isna().tolist() == [True] * 3 + [False] * 2
     assert frame["alpha"].isna().all()
+
+
+def points(out: Path, version: int = 1) -> None:
+    """Write reference points of push: idling earns -1, the best known 3."""
+    ends = {"idle": -1.0, "best_known": 3.0}
+    rows = [{"task": "push", "task_version": version, "point": name, "return_mean": end} for name, end in ends.items()]
+    store_table(out / FILE, REFERENCE_POINTS, *rows)
+
+
+def test_returns_come_with_their_place_between_idling_and_the_best_known(tmp_path: Path) -> None:
+    store_cell(tmp_path, curve=rising(-1.0, 1.0, 5.0), evaluation=[{"return": 3.0}, {"return": 7.0}])
+    store_cell(tmp_path, task="scoop", curve=rising(1.0))
+    store_cell(tmp_path, variant=Variant.of(cutout=0.4), curve=rising(2.0))
+    store_cell(tmp_path, variant=Variant.of(alpha=0.3), curve=rising(2.0))
+    store_cell(tmp_path, variant=Variant.of(somebodys=1), curve=rising(2.0))
+    assert load_results(tmp_path)["normalized_score"].isna().all(), "no points were measured"
+    points(tmp_path)
+    frame = load_results(tmp_path).set_index(["task", "variant"])["normalized_score"]
+    assert frame.loc["push", "default"].tolist() == [0.0, 0.5, 1.5]
+    assert frame.loc["push", "cutout-0.40"] == 0.75, "judged on the same instances"
+    others = frame.drop([("push", "default"), ("push", "cutout-0.40")])
+    assert len(others) == 3
+    assert others.isna().all(), "without points, with another reward, of an axis that is not known here"
+    evaluations = load_evaluations(tmp_path)
+    own = evaluations[(evaluations["task"] == "push") & (evaluations["variant"] == "default")]
+    assert own["normalized_score"].tolist() == [1.0, 2.0]
+
+
+def test_points_of_another_version_of_a_scene_give_no_score(tmp_path: Path) -> None:
+    store_cell(tmp_path, curve=rising(1.0), task_version=2)
+    points(tmp_path, version=1)
+    assert load_results(tmp_path)["normalized_score"].isna().all()
+    points(tmp_path, version=2)
+    assert load_results(tmp_path)["normalized_score"].tolist() == [0.5]
 
 
 def test_an_axis_that_a_study_added_is_a_column_of_every_row(tmp_path: Path) -> None:

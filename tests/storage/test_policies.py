@@ -7,12 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from builders import VERSION_0_1_0, store_cell, sweep, toy_cells
+from builders import BUDGET, VERSION_0_1_0, store_cell, sweep, toy_cells
 from codesign_bench import load_policy
+from codesign_bench.cell.variant import Variant
+from codesign_bench.config.settings import Sourced, StoredConfig
 from codesign_bench.errors import ChangedTaskError, UserError
 from codesign_bench.storage.cells import open_cell
-from codesign_bench.storage.policies import misfit, policy_and_task
+from codesign_bench.storage.policies import misfit, policy_and_task, problem_of
 from codesign_bench.task import Box, load_task
+from codesign_bench.task.episodes import Tradeoff
 from toy import ToyReach
 
 
@@ -32,6 +35,22 @@ def test_a_cell_of_a_task_or_method_that_is_not_here_is_named(tmp_path: Path, ki
     with pytest.raises(UserError, match=rf"^{folder}/cell\.json: unknown {kind} '{name}'; choose from: "):
         load_policy(folder)
     assert misfit(open_cell(folder)).startswith(f"{folder}/cell.json: unknown {kind}")
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_cell_is_judged_by_the_reward_and_on_the_instances_of_its_variant(tmp_path: Path) -> None:
+    variants = (Variant.of(), Variant.of(alpha=0.3), Variant.of(finetune=2), Variant.of(rung=1, setting=1))
+    validation = {"config": StoredConfig({**BUDGET.run, "instances": Sourced("validation", "axis")}, {})}
+    stored = [
+        store_cell(tmp_path, task="toy_reach", method="toy_search", variant=variant, **fields)
+        for variant, fields in zip(variants, ({}, {}, {}, validation), strict=True)
+    ]
+    default, tradeoff, place, tuned = (problem_of(open_cell(folder)) for folder in stored)
+    task = load_task("toy_reach")
+    assert (default.tradeoff, default.evaluation_instances().tolist()) == (None, task.evaluation_instances().tolist())
+    assert tradeoff.tradeoff == Tradeoff(0.3, 1.0)
+    assert place.evaluation_instances().tolist() == task.fine_tuning_instances()[1][:1].tolist()
+    assert tuned.evaluation_instances().tolist() == task.validation_instances().tolist()
 
 
 @pytest.mark.usefixtures("toy")

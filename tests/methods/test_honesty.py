@@ -59,7 +59,7 @@ def test_one_design_for_all_goals(make_method: MakeMethod, push: Task, name: str
     assert designs[0].any(), "it has moved from the middle of the design space"
 
 
-@pytest.mark.parametrize("name", ["gnn_ppo", "shared_arch"])
+@pytest.mark.parametrize("name", ["gnn_ppo", "shared_arch", "stackelberg_ppo"])
 def test_goal_conditioned_designers_design_by_goal(make_method: MakeMethod, push: Task, name: str) -> None:
     designs = trained(make_method, name).policy().design(starts(push))
     assert len(np.unique(designs, axis=0)) == len(designs)
@@ -173,6 +173,27 @@ def test_random_tools_are_drawn_anew_in_every_episode_and_the_middle_one_is_used
     assert len(np.unique(designs, axis=0)) == len(designs) > 8
     assert (np.abs(designs) <= 1.0).all()
     np.testing.assert_array_equal(method.policy().design(starts(push)), 0.0)
+
+
+@pytest.mark.parametrize(("limit", "same"), [(0.0, True), (1.0, False)])
+def test_a_leader_that_expects_no_response_is_the_designer_of_gnn_ppo(
+    make_method: MakeMethod, limit: float, same: bool
+) -> None:
+    leading: Any = make_method("stackelberg_ppo", response_limit=limit, fix_std=False)
+    plain: Any = make_method("gnn_ppo", design_credit="separate", fix_std=False)
+    for _ in range(3):
+        leading.train(BUDGET)
+        plain.train(BUDGET)
+    arrays, others = leading.state().arrays, plain.state().arrays
+    assert arrays.keys() == others.keys()
+    equal = all(np.array_equal(array, others[name]) for name, array in arrays.items())
+    assert equal == same
+    assert leading.learner.actor.design_log_std.requires_grad
+
+
+def test_a_leader_has_separate_credit_alone() -> None:
+    with pytest.raises(UserError, match="expected one of separate"):
+        resolve(load_method("stackelberg_ppo"), "push", "laptop", ["design_credit=joint"])
 
 
 @pytest.mark.parametrize("name", PPO_BASED)

@@ -26,7 +26,7 @@ class StackelbergPpo(gnn_ppo.GnnPpo):
 
     name = "stackelberg_ppo"
     label = "Stackelberg PPO"
-    config_class: ClassVar[type] = Config
+    config_class = Config  # type: ignore[assignment]  # one of its settings has fewer choices
     learner_class: ClassVar[type[TwoPhaseLearner]] = StackelbergLearner
 
     @classmethod

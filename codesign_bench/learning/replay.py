@@ -5,7 +5,7 @@ Shapes: `n` transitions, `O` observation, `D` design, `C` control.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -62,6 +62,12 @@ class Transitions:
         """Return some of the transitions."""
         return Transitions(**{name: array[index] for name, array in vars(self).items()})
 
+    def followed_by(self, other: Transitions) -> Transitions:
+        """Return these transitions and then those of `other`."""
+        return Transitions(
+            **{name: np.concatenate([array, getattr(other, name)]) for name, array in vars(self).items()}
+        )
+
     def __len__(self) -> int:
         return len(self.reward)
 
@@ -85,9 +91,17 @@ class ReplayBuffer:
             array[rows[latest]] = getattr(new, name)[latest]
         self.added += len(new)
 
-    def sample(self, count: int, rng: np.random.Generator) -> Transitions:
-        """Return `count` transitions, drawn uniformly with replacement."""
-        return self._store.rows(rng.integers(len(self), size=count))
+    def sample(self, count: int, rng: np.random.Generator, latest: int | None = None) -> Transitions:
+        """Return `count` transitions, drawn uniformly with replacement, from as many of the `latest`; None: all."""
+        among = len(self) if latest is None else min(latest, len(self))
+        # Where not all are wanted, the oldest of them comes first.
+        first = 0 if among == len(self) else self.added - among
+        return self._store.rows((first + rng.integers(among, size=count)) % len(self._store))
+
+    def where(self, chosen: Callable[[Transitions], Booleans]) -> Transitions:
+        """Return the transitions for which `chosen` is true, given all that are held."""
+        held = self._store.rows(slice(len(self)))
+        return held.rows(np.flatnonzero(chosen(held)))
 
     def arrays(self) -> dict[str, Array]:
         """Return the arrays for `load`, without copies, as `State.large` allows."""

@@ -11,7 +11,7 @@ Shapes: `K` stored starts, `P` designs, `n` transitions, `O` observation, `D` de
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -38,7 +38,7 @@ from codesign_bench.learning.soft_actor_critic import (
 from codesign_bench.learning.trajectories import Trajectories
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
-from codesign_bench.task import Booleans, Floats, Task
+from codesign_bench.task import Floats, Task
 
 from ._settings import Tuned, tuned
 
@@ -162,15 +162,11 @@ class Coadaptation(Method[Config]):
         self.own_steps += int((~transitions.is_design).sum())
         self.env_steps += batch.env_steps
         self.returns += [float(value) for slot in batch.episode_returns for value in slot]
-        individual = self._updates(self.config.individual_updates, batch)
-        metrics |= _means([self._learn_individual() for _ in range(individual)])
-        if self.designs > POPULATION_AFTER:
-            losses = [self._learn_population() for _ in range(self._updates(self.config.population_updates, batch))]
-            metrics |= {f"population_{name}": value for name, value in _means(losses).items()}
+        metrics |= self._learn(batch.env_steps)
         episodes = self._initial(self.config.initial_design_episodes, self.config.design_episodes)
         if len(self.returns) >= episodes:
             metrics |= self._next_tool()
-        return BatchReport(batch.env_steps, metrics, individual)
+        return BatchReport(batch.env_steps, metrics, self._updates(self.config.individual_updates, batch.env_steps))
 
     def _collect(self, remaining_steps: int) -> Trajectories:
         steps = min(self.config.batch_size, remaining_steps)
@@ -179,21 +175,40 @@ class Coadaptation(Method[Config]):
         explorer = FixedDesigns(SquashedExplorer(self.individual.actor), Trial(designs))
         return self.collector.collect(explorer, steps, slots, most_steps(self.env_steps, remaining_steps))
 
-    def _updates(self, per_step: float, batch: Trajectories) -> int:
-        return max(1, round(per_step * batch.env_steps))
+    def _learn(self, env_steps: int) -> dict[str, float]:
+        """Update the networks after a batch of `env_steps` steps; return the logged values."""
+        config, scale = self.config, self.reward_scale()
+        updates = range(self._updates(config.individual_updates, env_steps))
+        logged = _means([self._learn_individual(scale) for _ in updates])
+        if self.designs > POPULATION_AFTER:
+            updates = range(self._updates(config.population_updates, env_steps))
+            of_population = _means([self._learn_population(scale) for _ in updates])
+            logged |= {f"population_{name}": value for name, value in of_population.items()}
+        return logged | {"reward_scale": scale}
+
+    def _updates(self, per_step: float, env_steps: int) -> int:
+        return max(1, round(per_step * env_steps))
 
     def _initial(self, initial: int, later: int) -> int:
         return initial if self.designs <= self.config.initial_designs else later
 
-    def _learn_individual(self) -> dict[str, float]:
+    def reward_scale(self) -> float:
+        """Return the root mean square of all rewards in the buffer: what the networks learn as a reward of one.
+
+        The entropy's weight is in units of a reward. It is the source's, where a step earns about one.
+        """
+        return float(np.sqrt((self.buffer.held.reward**2).mean())) or 1.0
+
+    def _learn_individual(self, scale: float) -> dict[str, float]:
         rng, count = self.streams["individual updates"], self.config.minibatch_size
         own = round(self.config.current_share * count)
         batch = self.buffer.sample(own, rng, self.own_steps).followed_by(self.buffer.sample(count - own, rng))
-        return self.individual.update(batch, rng)
+        return self.individual.update(replace(batch, reward=batch.reward / np.float32(scale)), rng)
 
-    def _learn_population(self) -> dict[str, float]:
+    def _learn_population(self, scale: float) -> dict[str, float]:
         rng = self.streams["population updates"]
-        return self.population.update(self.buffer.sample(self.config.minibatch_size, rng), rng)
+        batch = self.buffer.sample(self.config.minibatch_size, rng)
+        return self.population.update(replace(batch, reward=batch.reward / np.float32(scale)), rng)
 
     def _next_tool(self) -> dict[str, float]:
         """Give up the current tool, and take the next one with the population's networks; return the logged values."""
@@ -205,7 +220,7 @@ class Coadaptation(Method[Config]):
         size, metrics = self.problem.task.design_space.size, {}
         if searched:
             found = maximize(self.promised(self.starts()), size, self.config, self.streams["swarm"])
-            design, metrics = found.position, {"promised_value": found.value}
+            design, metrics = found.position, {"promised_value": found.value * self.reward_scale()}
         else:
             design = self.streams["random designs"].uniform(-1.0, 1.0, size)
         self.current.unit_design.copy_(torch.from_numpy(design))
@@ -224,17 +239,12 @@ class Coadaptation(Method[Config]):
     def starts(self) -> Tensor:
         """Return observations (K, O) of first control steps, drawn from those in the buffer."""
         elapsed = self.problem.task.layout.phase.stop - 1
-
-        def first(held: Transitions) -> Booleans:
-            starting: Booleans = held.observation[:, elapsed] == 0.0
-            return starting
-
-        starts = self.buffer.where(first).observation
-        rows = self.streams["starts"].integers(len(starts), size=self.config.stored_starts)
-        return torch.from_numpy(starts[rows])
+        observation = self.buffer.held.observation
+        starts = np.flatnonzero(observation[:, elapsed] == 0.0)
+        return torch.from_numpy(observation[self.streams["starts"].choice(starts, self.config.stored_starts)])
 
     def promised(self, starts: Tensor) -> Fitness:
-        """Return the function from designs (P, D) to the mean value (P,) of `starts` (K, O) under each of them."""
+        """Return the function from designs (P, D) to the mean value (P,) of `starts` (K, O), in units of its scale."""
         place = self.problem.task.layout.design
 
         def values(designs: Floats) -> Floats:

@@ -5,7 +5,7 @@ Shapes: `n` transitions, `O` observation, `D` design, `C` control.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -98,14 +98,14 @@ class ReplayBuffer:
         first = 0 if among == len(self) else self.added - among
         return self._store.rows((first + rng.integers(among, size=count)) % len(self._store))
 
-    def where(self, chosen: Callable[[Transitions], Booleans]) -> Transitions:
-        """Return the transitions for which `chosen` is true, given all that are held."""
-        held = self._store.rows(slice(len(self)))
-        return held.rows(np.flatnonzero(chosen(held)))
+    @property
+    def held(self) -> Transitions:
+        """All transitions in the buffer, in no particular order; not copies."""
+        return self._store.rows(slice(len(self)))
 
     def arrays(self) -> dict[str, Array]:
         """Return the arrays for `load`, without copies, as `State.large` allows."""
-        return {**vars(self._store.rows(slice(len(self)))), "added": np.array(self.added)}
+        return {**vars(self.held), "added": np.array(self.added)}
 
     def load(self, arrays: Mapping[str, Array]) -> None:
         """Restore the arrays that `arrays` returned."""

@@ -49,7 +49,7 @@ class SoftActorCriticConfig:
     temperature: Annotated[float, Within(0.0, 1_000.0)] = field(
         default=0.01, metadata={"search": LogUniform(1e-3, 0.1)}
     )
-    """Weight of the entropy, in units of the reward; fixed."""
+    """Weight of the entropy, in units of the rewards that the networks learn from; fixed."""
     hidden: SomeWidths = (200, 200, 200)
     """Widths of the hidden layers of actor and critics."""
 

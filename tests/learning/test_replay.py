@@ -83,9 +83,13 @@ def test_samples_may_be_of_the_latest(reach: Task, added: int, latest: int, expe
     assert {*buffer.sample(200, np.random.default_rng(0), latest).reward.tolist()} == expected
 
 
-def test_transitions_are_picked_by_what_they_hold_and_joined(reach: Task) -> None:
+def test_a_buffer_shows_what_it_holds(reach: Task) -> None:
     buffer = ReplayBuffer(5, reach)
-    buffer.add(numbered(reach, 0, 7))
-    odd = buffer.where(lambda held: held.reward % 2 == 1)
-    assert sorted(odd.reward.tolist()) == [3.0, 5.0]
-    assert odd.followed_by(numbered(reach, 8, 2)).reward.tolist()[2:] == [8.0, 9.0]
+    for first, held in ((0, [0.0, 1.0, 2.0]), (3, [1.0, 2.0, 3.0, 4.0, 5.0])):
+        buffer.add(numbered(reach, first, 3))
+        assert sorted(buffer.held.reward.tolist()) == held
+
+
+def test_transitions_follow_others(reach: Task) -> None:
+    joined = numbered(reach, 3, 2).followed_by(numbered(reach, 8, 2))
+    assert joined.reward.tolist() == joined.observation[:, 0].tolist() == [3.0, 4.0, 8.0, 9.0]

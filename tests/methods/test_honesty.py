@@ -155,10 +155,11 @@ def test_searched_and_random_tools_take_turns_after_the_initial_ones(make_method
 def test_a_searched_tool_is_the_one_that_the_populations_critic_promises_most(make_method: MakeMethod) -> None:
     method: Any = make_method("coadaptation", initial_designs=1, swarm_size=100, swarm_iterations=30)
     before = method.streams["starts"].bit_generator.state
-    promised = method.train(BUDGET).metrics["promised_value"]
+    promised = method.train(BUDGET).metrics["promised_value"] / method.reward_scale()
     method.streams["starts"].bit_generator.state = before
     values = method.promised(method.starts())
     assert values(method.current.unit_design.double().numpy()[None]) == pytest.approx(promised, abs=1e-5)
+    assert method.reward_scale() == pytest.approx(np.sqrt((method.buffer.held.reward.astype(float) ** 2).mean()))
     others = np.random.default_rng(0).uniform(-1.0, 1.0, (300, method.current.unit_design.numel()))
     assert promised > values(others).max() > values(others).min()
 

@@ -12,7 +12,9 @@ separately; the designer has its own updates and its own KL stop. `NoCredit`: de
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import torch
@@ -29,6 +31,10 @@ from codesign_bench.learning.update_loop import UpdateLoop
 from codesign_bench.learning.value_networks import DesignValue
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Booleans, Slots, Task
+
+Kind = TypeVar("Kind", bound=PolicyUpdate)
+MakeUpdate = Callable[[PolicyLoss, LogProbs, torch.optim.Optimizer, Tensor, Tensor], Kind]
+"""Makes an update of the designer from the arguments of `PolicyUpdate`."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +102,16 @@ class DesignCredit(ABC):
             return gaussian(*distribution, steps.control[index])
 
         return of_controls
+
+    def lead(self, batch: Trajectories, steps: Steps, advantage: Tensor) -> dict[str, float]:
+        """Learn from the design steps before the batch's policy update; return the logged values. By default nothing.
+
+        Args:
+            batch: the batch.
+            steps: its valid steps.
+            advantage: (n,) advantages that the policy update will use, zero at steps that it does not learn from.
+        """
+        return {}
 
     @abstractmethod
     def learn(self, batch: Trajectories) -> dict[str, float]:
@@ -168,6 +184,10 @@ class SeparateCredit(DesignCredit):
 
     def learn(self, batch: Trajectories) -> dict[str, float]:
         """Update the designer and its value network on the design steps (d,) of `batch`."""
+        return self.learn_designs(batch, PolicyUpdate)[1]
+
+    def learn_designs(self, batch: Trajectories, update: MakeUpdate[Kind]) -> tuple[Kind, dict[str, float]]:
+        """Update the designer and its value network; return the designer's update and the logged values."""
         config, tensor = self.config, self.compute.tensor
         where = batch.is_design & batch.valid
         observation, design = tensor(batch.observation[where]), tensor(batch.design[where])
@@ -186,18 +206,14 @@ class SeparateCredit(DesignCredit):
             # has just moved the designer too, and measured from the rollout the KL stop would end the design update
             # for what the control update did.
             old_log_prob = log_probs(rows)[0]
-        policy = PolicyUpdate(
-            PolicyLoss.of(config, config.design_kl_threshold),
-            log_probs,
-            self.optimizers["design"],
-            old_log_prob,
-            advantage,
-        )
+        loss = PolicyLoss.of(config, config.design_kl_threshold)
+        policy = update(loss, log_probs, self.optimizers["design"], old_log_prob, advantage)
         target = self.value.normalized(returns)
         value = ValueUpdate(self.value, self.optimizers["design_value"], observation, target, config.max_gradient_norm)
         rng = self.streams["design minibatches"]
         self.loop.run((policy, value), rows, config.design_epochs, config.design_minibatch_size, rng)
-        return {"design_kl": policy.divergence, "design_steps": float(policy.steps), "design_value_loss": value.loss}
+        logged = {"design_kl": policy.divergence, "design_steps": float(policy.steps), "design_value_loss": value.loss}
+        return policy, logged
 
     def _of_designs(self, observation: Tensor, design: Tensor) -> LogProbs:
         """Return the log-probabilities of designs (d, D) for their observations (d, O) as a function of rows."""

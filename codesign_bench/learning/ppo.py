@@ -91,8 +91,12 @@ class PolicyUpdate:
         if self.divergence > self.loss.kl_threshold:
             self.stopped = True
             return
-        gradient_step(loss, self.optimizer, self.parameters, self.loss.max_gradient_norm)
+        self.descend(loss, rows)
         self.steps += 1
+
+    def descend(self, loss: Tensor, rows: Slots) -> None:
+        """Take one gradient step on `loss` (), that of `rows` (m,)."""
+        gradient_step(loss, self.optimizer, self.parameters, self.loss.max_gradient_norm)
 
 
 class ValueUpdate:
@@ -130,6 +134,11 @@ def gradient_step(
     """Take one step on `loss` with a clipped gradient norm."""
     optimizer.zero_grad(set_to_none=True)
     loss.backward()
+    clipped_step(optimizer, parameters, max_norm)
+
+
+def clipped_step(optimizer: torch.optim.Optimizer, parameters: list[nn.Parameter], max_norm: float) -> None:
+    """Take one step on the gradients that the parameters have, with their norm clipped."""
     nn.utils.clip_grad_norm_([p for p in parameters if p.grad is not None], max_norm)
     optimizer.step()
 

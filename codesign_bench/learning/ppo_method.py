@@ -54,12 +54,13 @@ class PPOMethod(TwoPhaseMethod[ConfigType]):
     """A PPO-based method without its networks."""
 
     config_class: ClassVar[type] = PPOConfig
+    learner_class: ClassVar[type[TwoPhaseLearner]] = TwoPhaseLearner
 
     def __init__(self, problem: Problem, config: ConfigType, streams: Streams) -> None:
         super().__init__(problem, config, streams)
         actor = self.make_actor(problem.task, config, streams["policy weights"])
         value = self.make_value(problem.task, config, streams["value weights"])
-        self.learner = TwoPhaseLearner(problem, config, streams, actor, value)
+        self.learner = self.learner_class(problem, config, streams, actor, value)
 
     @classmethod
     @abstractmethod

@@ -62,6 +62,12 @@ class Transitions:
         """Return some of the transitions."""
         return Transitions(**{name: array[index] for name, array in vars(self).items()})
 
+    def followed_by(self, other: Transitions) -> Transitions:
+        """Return these transitions and then those of `other`."""
+        return Transitions(
+            **{name: np.concatenate([array, getattr(other, name)]) for name, array in vars(self).items()}
+        )
+
     def __len__(self) -> int:
         return len(self.reward)
 
@@ -85,13 +91,21 @@ class ReplayBuffer:
             array[rows[latest]] = getattr(new, name)[latest]
         self.added += len(new)
 
-    def sample(self, count: int, rng: np.random.Generator) -> Transitions:
-        """Return `count` transitions, drawn uniformly with replacement."""
-        return self._store.rows(rng.integers(len(self), size=count))
+    def sample(self, count: int, rng: np.random.Generator, latest: int | None = None) -> Transitions:
+        """Return `count` transitions, drawn uniformly with replacement, from as many of the `latest`; None: all."""
+        among = len(self) if latest is None else min(latest, len(self))
+        # Where not all are wanted, the oldest of them comes first.
+        first = 0 if among == len(self) else self.added - among
+        return self._store.rows((first + rng.integers(among, size=count)) % len(self._store))
+
+    @property
+    def held(self) -> Transitions:
+        """All transitions in the buffer, in no particular order; not copies."""
+        return self._store.rows(slice(len(self)))
 
     def arrays(self) -> dict[str, Array]:
         """Return the arrays for `load`, without copies, as `State.large` allows."""
-        return {**vars(self._store.rows(slice(len(self)))), "added": np.array(self.added)}
+        return {**vars(self.held), "added": np.array(self.added)}
 
     def load(self, arrays: Mapping[str, Array]) -> None:
         """Restore the arrays that `arrays` returned."""

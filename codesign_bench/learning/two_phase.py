@@ -56,7 +56,7 @@ class TwoPhaseLearner:
         self.compute = Compute(config.precision)
         self.loop = loop or UpdateLoop()
         self.critic = Critic(value, config, self.compute)
-        self.credit = self._make_credit()
+        self.credit = self.make_credit()
         self.optimizers: dict[str, torch.optim.Optimizer] = {
             "policy": adam(self.credit.policy_parameters(), config.policy_learning_rate),
             "value": adam(value.parameters(), config.value_learning_rate),
@@ -66,7 +66,8 @@ class TwoPhaseLearner:
         self.fixed: FixedUpdates | None = None
         self.env_steps = 0
 
-    def _make_credit(self) -> DesignCredit:
+    def make_credit(self) -> DesignCredit:
+        """Return how the design step is learned."""
         if self.give_designs is not None:
             return NoCredit(self.actor, self.compute)
         if self.config.design_credit == "joint":
@@ -125,7 +126,9 @@ class TwoPhaseLearner:
     def _update(self, batch: Trajectories) -> dict[str, float]:
         steps = Steps.of(batch, self.compute)
         estimates = self.critic.estimate(batch, steps.observation)
-        metrics = self._update_policy_and_value(steps, estimates) | self._stds()
+        advantage = self._advantage(steps, estimates)
+        metrics = self.credit.lead(batch, steps, advantage)
+        metrics |= self._update_policy_and_value(steps, advantage, estimates.target) | self._stds()
         # The design step may have its own updates. Observation statistics come last: ratios compare the new policy with
         # the log-probabilities of the rollout, which used the old statistics.
         metrics |= self.credit.learn(batch)
@@ -134,25 +137,26 @@ class TwoPhaseLearner:
             self.value.update_statistics(steps.observation)
         return metrics | {"explained_variance": estimates.explained_variance}
 
-    def _update_policy_and_value(self, steps: Steps, estimates: Estimates) -> dict[str, float]:
-        config, optimizers = self.config, self.optimizers
-        rows = np.flatnonzero(self.credit.learned(steps.designing))
-        learned = self.compute.tensor(rows)
-        # Normalised over the steps that this update learns from. Design steps, few and with a different spread, must
-        # not shift the scale when they have their own update.
+    def _advantage(self, steps: Steps, estimates: Estimates) -> Tensor:
+        """Return advantages (n,), normalised over the steps that the batch's policy update learns from, else zero."""
+        # Design steps, few and with a different spread, must not shift the scale when they have their own update.
+        learned = self.compute.tensor(np.flatnonzero(self.credit.learned(steps.designing)))
         advantage = torch.zeros_like(estimates.advantage)
         advantage[learned] = normalized(estimates.advantage[learned])
+        return advantage
+
+    def _update_policy_and_value(self, steps: Steps, advantage: Tensor, target: Tensor) -> dict[str, float]:
+        config, optimizers = self.config, self.optimizers
+        rows = np.flatnonzero(self.credit.learned(steps.designing))
         log_probs = self.credit.log_probs(steps)
         old_log_prob = self._old_log_prob(steps, log_probs, rows)
         first = steps.designing[rows] if config.batch_design else None
         drawing = (rows, config.epochs, config.minibatch_size, self.streams["minibatches"], first)
         if self.fixed is not None:
-            return self.fixed.run(Batch(steps, old_log_prob, advantage, estimates.target), drawn(*drawing))
+            return self.fixed.run(Batch(steps, old_log_prob, advantage, target), drawn(*drawing))
         loss = PolicyLoss.of(config, config.kl_threshold)
         policy = PolicyUpdate(loss, log_probs, optimizers["policy"], old_log_prob, advantage)
-        value = ValueUpdate(
-            self._predict, optimizers["value"], steps.observation, estimates.target, config.max_gradient_norm
-        )
+        value = ValueUpdate(self._predict, optimizers["value"], steps.observation, target, config.max_gradient_norm)
         self.loop.run((policy, value), *drawing)
         return {"value_loss": value.loss, "kl": policy.divergence, "policy_steps": float(policy.steps)}
 

@@ -74,3 +74,22 @@ def test_arrays_are_no_copies_and_hold_only_what_was_added(reach: Task) -> None:
     assert len(arrays["observation"]) == 3
     buffer.add(numbered(reach, 10, 1_000))
     assert arrays["reward"][0] != 0.0, "they are written before training continues"
+
+
+@pytest.mark.parametrize(("added", "latest", "expected"), [(4, 2, {2, 3}), (7, 3, {4, 5, 6}), (7, 9, {2, 3, 4, 5, 6})])
+def test_samples_may_be_of_the_latest(reach: Task, added: int, latest: int, expected: set[float]) -> None:
+    buffer = ReplayBuffer(5, reach)
+    buffer.add(numbered(reach, 0, added))
+    assert {*buffer.sample(200, np.random.default_rng(0), latest).reward.tolist()} == expected
+
+
+def test_a_buffer_shows_what_it_holds(reach: Task) -> None:
+    buffer = ReplayBuffer(5, reach)
+    for first, held in ((0, [0.0, 1.0, 2.0]), (3, [1.0, 2.0, 3.0, 4.0, 5.0])):
+        buffer.add(numbered(reach, first, 3))
+        assert sorted(buffer.held.reward.tolist()) == held
+
+
+def test_transitions_follow_others(reach: Task) -> None:
+    joined = numbered(reach, 3, 2).followed_by(numbered(reach, 8, 2))
+    assert joined.reward.tolist() == joined.observation[:, 0].tolist() == [3.0, 4.0, 8.0, 9.0]

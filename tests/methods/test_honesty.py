@@ -134,6 +134,84 @@ def test_the_critic_is_asked_for_the_state_after_the_design_step(make_method: Ma
     assert float(found) == pytest.approx(float(expected), abs=0.2)
 
 
+def test_searched_and_random_tools_take_turns_after_the_initial_ones(make_method: MakeMethod) -> None:
+    method: Any = make_method("coadaptation", initial_designs=2)
+    tools, searched = [method.current.unit_design.clone()], []
+    for _ in range(5):
+        searched.append("promised_value" in method.train(BUDGET).metrics)
+        tools.append(method.current.unit_design.clone())
+    assert searched == [False, True, False, True, False]
+    assert not tools[0].any()
+    assert len(torch.unique(torch.stack(tools), dim=0)) == len(tools)
+    assert (method.designs, method.returns, method.own_steps) == (6, [], 0)
+
+
+def test_a_searched_tool_is_the_one_that_the_populations_critic_promises_most(make_method: MakeMethod) -> None:
+    method: Any = make_method("coadaptation", initial_designs=1, swarm_size=100, swarm_iterations=30)
+    before = method.streams["starts"].bit_generator.state
+    promised = method.train(BUDGET).metrics["promised_value"] / method.reward_scale()
+    method.streams["starts"].bit_generator.state = before
+    values = method.promised(method.starts())
+    assert values(method.current.unit_design.double().numpy()[None]) == pytest.approx(promised, abs=1e-5)
+    assert method.reward_scale() == pytest.approx(np.sqrt((method.buffer.held.reward.astype(float) ** 2).mean()))
+    others = np.random.default_rng(0).uniform(-1.0, 1.0, (300, method.current.unit_design.numel()))
+    assert promised > values(others).max() > values(others).min()
+
+
+def test_starts_are_first_control_steps_and_only_their_design_is_replaced(make_method: MakeMethod, push: Task) -> None:
+    method: Any = make_method("coadaptation")
+    method.train(BUDGET)
+    starts = method.starts()
+    elapsed = push.layout.phase.stop - 1
+    assert starts.shape == (method.config.stored_starts, push.layout.size)
+    assert not starts[:, elapsed].any()
+    design = np.linspace(-0.5, 0.5, push.design_space.size)
+    seen = starts.clone()
+    seen[:, push.layout.design] = torch.from_numpy(design).float()
+    with torch.no_grad():
+        expected = method.population.critic(seen, method.population.actor.control(seen)).amin(0).mean()
+    found = method.promised(starts)(np.stack([0.0 * design, design]))
+    assert found[1] == pytest.approx(float(expected), abs=1e-5)
+    assert found[0] != found[1]
+
+
+def test_the_population_is_trained_from_the_fourth_tool_on_and_every_tool_starts_from_it(
+    make_method: MakeMethod,
+) -> None:
+    method: Any = make_method("coadaptation")
+    untrained = {name: tensor.clone() for name, tensor in method.population.critic.state_dict().items()}
+    for tool in range(1, 6):
+        assert method.designs == tool
+        trained = "population_critic_loss" in method.train(BUDGET).metrics
+        assert trained == (tool > 3)
+        same = all(torch.equal(tensor, untrained[n]) for n, tensor in method.population.critic.state_dict().items())
+        assert same == (tool <= 3)
+        for name, network in method.individual.modules.items():
+            for key, tensor in network.state_dict().items():
+                assert torch.equal(tensor, method.population.modules[name].state_dict()[key])
+
+
+def test_the_policy_is_the_tool_that_earned_most_in_its_later_half_with_its_actor(
+    make_method: MakeMethod, push: Task
+) -> None:
+    method: Any = make_method("coadaptation")
+
+    def given_up(tool: float, returns: list[float]) -> float:
+        method.current.unit_design.fill_(tool)
+        method.returns = returns
+        method.keep_the_better()
+        return float(method.policy().design(starts(push))[0, 0])
+
+    assert given_up(0.25, [9.0, 9.0, 1.0, 1.0]) == 0.25
+    controls = method.policy().act(starts(push))
+    with torch.no_grad():
+        method.individual.actor.mlp[-1].bias.add_(1.0)
+    assert given_up(0.5, [5.0, 5.0, 0.0, 0.5]) == 0.25
+    np.testing.assert_array_equal(method.policy().act(starts(push)), controls)
+    assert given_up(-0.75, [0.0, 0.0, 2.0, 2.0]) == -0.75
+    assert (method.policy().act(starts(push)) > controls).all()
+
+
 def test_an_archive_holds_the_best_plan_of_every_cell(push: Task) -> None:
     method_class = load_method("pt_me")
     method: Any = method_class(Problem(push), replace(method_class.config_class(), **method_class.small()), Streams(0))
@@ -211,6 +289,27 @@ def test_random_tools_are_drawn_anew_in_every_episode_and_the_middle_one_is_used
     assert len(np.unique(designs, axis=0)) == len(designs) > 8
     assert (np.abs(designs) <= 1.0).all()
     np.testing.assert_array_equal(method.policy().design(starts(push)), 0.0)
+
+
+@pytest.mark.parametrize(("limit", "same"), [(0.0, True), (1.0, False)])
+def test_a_leader_that_expects_no_response_is_the_designer_of_gnn_ppo(
+    make_method: MakeMethod, limit: float, same: bool
+) -> None:
+    leading: Any = make_method("stackelberg_ppo", response_limit=limit, fix_std=False)
+    plain: Any = make_method("gnn_ppo", design_credit="separate", fix_std=False)
+    for _ in range(3):
+        leading.train(BUDGET)
+        plain.train(BUDGET)
+    arrays, others = leading.state().arrays, plain.state().arrays
+    assert arrays.keys() == others.keys()
+    equal = all(np.array_equal(array, others[name]) for name, array in arrays.items())
+    assert equal == same
+    assert leading.learner.actor.design_log_std.requires_grad
+
+
+def test_a_leader_has_separate_credit_alone() -> None:
+    with pytest.raises(UserError, match="expected one of separate"):
+        resolve(load_method("stackelberg_ppo"), "push", "laptop", ["design_credit=joint"])
 
 
 @pytest.mark.parametrize("name", PPO_BASED)

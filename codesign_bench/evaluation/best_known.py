@@ -35,6 +35,7 @@ from codesign_bench.storage.policies import misfit, policy_of
 from codesign_bench.storage.reading import UnusableFile
 from codesign_bench.task import EVALUATION_SEED, Behaviour, Booleans, Floats, Singles, Slots, Task
 from codesign_bench.task.behaviours import GivenDesigns
+from codesign_bench.task.episodes import portions
 from codesign_bench.task.simulators import Simulators
 
 SEARCH, SCRIPT = "search", "script"
@@ -175,8 +176,10 @@ def _take_from(cell: StoredCell, results: Path, state: Update, log: Log) -> None
     if len(chosen):
         indices = chosen["instance"].to_numpy(dtype=np.intp)
         designs = chosen[[f"design_{name}" for name in task.design_space.names]].to_numpy(dtype=np.float64)
-        tools = GivenDesigns(task.design_space.to_unit(designs), policy)
-        state.offer(state.play(tools, indices), indices, f"{source}, another tool")
+        tools = task.design_space.to_unit(designs)
+        for part in portions(len(indices), task):  # a tool per episode needs all episodes of a part at once
+            played = state.play(GivenDesigns(tools[part], policy), indices[part])
+            state.offer(played, indices[part], f"{source}, another tool")
 
 
 def _tells_returns(state: Update, cell: StoredCell, own: pd.DataFrame) -> bool:

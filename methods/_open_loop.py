@@ -1,6 +1,6 @@
-"""What methods share that search a design and an open-loop sequence of controls, a *plan*.
+"""What methods share that search plans, a design and an open-loop sequence of controls.
 
-Shapes: `b` plans, `X` numbers of a plan, `I` instance, `O` observation, `D` design, `C` control, `H` horizon.
+Shapes: `b` plans, `X` numbers of a plan, `I` instance, `O` observation.
 """
 
 from __future__ import annotations
@@ -12,21 +12,7 @@ import numpy as np
 from codesign_bench.method import Problem
 from codesign_bench.task import Booleans, Floats, Singles, Task
 from codesign_bench.task.episodes import portions
-
-
-def plan_size(task: Task) -> int:
-    """Return X: a design and a control for each time step, all in [-1, 1]."""
-    return task.design_space.size + task.horizon * task.control_space.size
-
-
-def designs_of(task: Task, plans: Floats) -> Floats:
-    """Return the designs (b, D) of plans (b, X)."""
-    return plans[..., : task.design_space.size]
-
-
-def controls_of(task: Task, plans: Floats) -> Floats:
-    """Return the controls (b, H, C) of plans (b, X)."""
-    return plans[..., task.design_space.size :].reshape(*plans.shape[:-1], task.horizon, task.control_space.size)
+from codesign_bench.task.plans import controls_of, designs_of
 
 
 def step_of(task: Task, observation: Singles) -> np.ndarray:

@@ -19,8 +19,9 @@ from codesign_bench.learning.cma_es import Evolution, EvolutionConfig, fitness_m
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Floats, Singles, Task
+from codesign_bench.task.plans import controls_of, designs_of, plan_size
 
-from ._open_loop import controls_of, designs_of, plan_size, play, step_of
+from ._open_loop import play, step_of
 from ._settings import Tuned, tuned
 
 PLAN = "plan"

@@ -25,8 +25,9 @@ from codesign_bench.config.values import Share, Within
 from codesign_bench.method import BatchReport, Method, Policy, Problem, State
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Booleans, Box, Floats, Singles, Slots, Task
+from codesign_bench.task.plans import controls_of, designs_of, plan_size
 
-from ._open_loop import controls_of, designs_of, plan_size, play, step_of
+from ._open_loop import play, step_of
 from ._settings import Tuned, tuned
 
 NEAREST_OF = (1, 5, 10, 50)

@@ -19,13 +19,12 @@ import numpy as np
 import pandas as pd
 
 from codesign_bench.cell.axes import keeps_returns
-from codesign_bench.config.validation import check_values
 from codesign_bench.config.values import Within
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
-from codesign_bench.evaluation.headroom import DESIGNER, fingerprint, name_of
-from codesign_bench.evaluation.plans import parts_of, plan_size, plans_of, replay
+from codesign_bench.evaluation.headroom import DESIGNER, SearchBudget, Sigma, fingerprint, name_of
+from codesign_bench.evaluation.plans import plans_of, replay
 from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
 from codesign_bench.seeding import generator
 from codesign_bench.storage.best_known import BestKnown, Episode, load_best_known, store
@@ -36,6 +35,7 @@ from codesign_bench.storage.reading import UnusableFile
 from codesign_bench.task import EVALUATION_SEED, Behaviour, Booleans, Floats, Singles, Slots, Task
 from codesign_bench.task.behaviours import GivenDesigns
 from codesign_bench.task.episodes import portions
+from codesign_bench.task.plans import controls_of, designs_of, plan_size
 from codesign_bench.task.simulators import Simulators
 
 SEARCH, SCRIPT = "search", "script"
@@ -46,22 +46,15 @@ SAME = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
-class Search:
-    """What a search spends on every instance."""
+class Search(SearchBudget):
+    """What a search of plans spends on every instance."""
 
-    candidates: Annotated[int, Within(0, 1_000_000)] = 240
-    """Most plans of CMA-ES; its generations are whole."""
-    popsize: Annotated[int, Within(2, 10_000)] = 12
-    """Plans of a generation."""
-    sigma0: Annotated[float, Within(1e-12, 10.0)] = 0.1
+    sigma0: Sigma = 0.1
     """Initial standard deviation, of designs and of changes of controls; both are in [-1, 1]."""
     knots: Annotated[int, Within(1, 1_000)] = 8
     """K: times at which controls are changed."""
     neighbours: Annotated[int, Within(0, 1_000)] = 8
     """Nearest instances whose best plans are tried first."""
-
-    def __post_init__(self) -> None:
-        check_values(self)
 
 
 @dataclass
@@ -285,13 +278,13 @@ class _Bent:
     def start(self, plan: Singles) -> Floats:
         """Return the numbers that change nothing of a plan (X,)."""
         start = np.zeros(self.size)
-        start[: self.task.design_space.size] = plan[: self.task.design_space.size]
+        start[: self.task.design_space.size] = designs_of(self.task, plan)
         return start
 
     def plans(self, plan: Singles, numbers: Floats) -> Singles:
         """Return the plans (b, X) of numbers (b, size) around a plan (X,)."""
         count, size = len(numbers), self.task.design_space.size
-        _, controls = parts_of(self.task, plan[None])
+        controls = controls_of(self.task, plan[None])
         changes = numbers[:, size:].reshape(count, self.knots, self.task.control_space.size)
         bent = np.clip(controls + np.einsum("hk,bkc->bhc", self.weights, changes), -1.0, 1.0)
         return np.concatenate([numbers[:, :size], bent.reshape(count, -1)], axis=1).astype(np.float32)

@@ -37,6 +37,7 @@ from codesign_bench.task.behaviours import GivenDesigns
 from codesign_bench.task.episodes import portions
 from codesign_bench.task.play import first_observations
 
+Sigma = Annotated[float, Within(1e-12, 10.0)]
 DESIGNER, OTHER, RANDOM, SEARCH = "designer", "another goal", "random", "search"
 """Where a tool comes from."""
 UNIT = np.float32
@@ -44,20 +45,26 @@ UNIT = np.float32
 
 
 @dataclass(frozen=True, kw_only=True)
-class Budget:
-    """What is tried on every instance, besides the designer's own tools."""
+class SearchBudget:
+    """What CMA-ES spends on every instance."""
 
     candidates: Annotated[int, Within(0, 1_000_000)] = 240
-    """Most tools of CMA-ES; its generations are whole."""
+    """Most candidates; generations are whole."""
     popsize: Annotated[int, Within(2, 10_000)] = 12
-    """Tools of a generation."""
-    sigma0: Annotated[float, Within(1e-12, 10.0)] = 0.3
-    """Initial standard deviation; normalised designs are in [-1, 1]."""
-    random_tools: Annotated[int, Within(1, 10_000)] = 8
-    """Random tools, uniform in the design space, over whose results the mean is taken."""
+    """Candidates of a generation."""
 
     def __post_init__(self) -> None:
         check_values(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Budget(SearchBudget):
+    """What is tried on every instance in addition to the designer's own tools."""
+
+    sigma0: Sigma = 0.3
+    """Initial standard deviation; normalised designs are in [-1, 1]."""
+    random_tools: Annotated[int, Within(1, 10_000)] = 8
+    """Random tools, uniform in the design space, over whose results the mean is taken."""
 
 
 @dataclass
@@ -156,7 +163,7 @@ def summary(paths: Sequence[Path]) -> tuple[list[str], list[list[str]]]:
     Raises:
         UnusableFile: one cannot be used.
     """
-    told = []
+    table = []
     for path in paths:
         rows = rows_of(path)
         means = {
@@ -166,9 +173,9 @@ def summary(paths: Sequence[Path]) -> tuple[list[str], list[list[str]]]:
         }
         shown = [f"{means[f'{tools}_return']:.2f} ({means[f'{tools}_success']:.2f})" for tools in TOOLS]
         steps = sum(int(row["env_steps"]) for row in rows)
-        told.append([path.stem, str(len(rows)), *shown, f"{steps:,}"])
+        table.append([path.stem, str(len(rows)), *shown, f"{steps:,}"])
     titles = ["designer", "best tool found", "best tool of another goal", "random tool"]
-    return ["cell", "instances", *titles, "env steps"], told
+    return ["cell", "instances", *titles, "env steps"], table
 
 
 def fingerprint(cell: StoredCell) -> str:
@@ -188,7 +195,7 @@ def measure_instance(controller: Controller, tools: Singles, index: int, budget:
         controller: plays them.
         tools: (N, D) the designer's own for each instance.
         index: of the instance.
-        budget: what is tried besides.
+        budget: what is tried in addition to these.
     """
     task = controller.problem.task
     rng = generator(EVALUATION_SEED, f"headroom of {task.name} on instance {index}")

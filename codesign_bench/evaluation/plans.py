@@ -1,8 +1,8 @@
-"""Episodes as plans, a design and a control for every step: recorded from any behaviour, and played again without it.
+"""Plans of episodes: recorded from any behaviour, and played again without it.
 
 Simulators are deterministic, so a plan is all that it takes to repeat what a policy, a script or a search once did.
 
-Shapes: `N` plans, `X` numbers of a plan, `I` instance, `D` design, `H` horizon, `C` control.
+Shapes: `N` plans, `X` numbers of a plan, `I` instance.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from codesign_bench.evaluation.evaluate import Evaluation, evaluate
 from codesign_bench.task import Behaviour, Floats, Singles, Task
 from codesign_bench.task.episodes import Episodes, portions
+from codesign_bench.task.plans import controls_of, designs_of
 from codesign_bench.task.simulators import Simulators
 from codesign_bench.task.spaces import Slots
 
@@ -31,17 +32,6 @@ class _Repeated(Behaviour):
     def act(self, observation: Singles) -> Singles:
         """Return what is shown."""
         return observation
-
-
-def plan_size(task: Task) -> int:
-    """Return X: a design and a control for each step, all in [-1, 1]."""
-    return task.design_space.size + task.horizon * task.control_space.size
-
-
-def parts_of(task: Task, plans: Singles) -> tuple[Singles, Singles]:
-    """Return the designs (N, D) and the controls (N, H, C) of plans (N, X)."""
-    size = task.design_space.size
-    return plans[:, :size], plans[:, size:].reshape(len(plans), task.horizon, task.control_space.size)
 
 
 def plans_of(evaluation: Evaluation) -> Singles:
@@ -62,7 +52,7 @@ def replay(task: Task, plans: Singles, instances: Floats, simulators: Simulators
     lender = Simulators(task) if simulators is None else simulators
     parts = []
     for part in portions(len(plans), task):
-        designs, controls = parts_of(task, plans[part])
+        designs, controls = designs_of(task, plans[part]), controls_of(task, plans[part])
 
         def control_of(episodes: Episodes, slots: Slots, controls: Singles = controls) -> Singles:
             return controls[slots, episodes.elapsed[slots]]

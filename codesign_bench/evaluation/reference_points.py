@@ -125,9 +125,9 @@ def best_known(task: Task, points: Sequence[Point], results: Path) -> Point:
     sources = [[*own, *(name for name, _ in cells)] for own in names]
     # The best single tool is one of those that `ANY_TOOL` counts.
     tools = sum(point.tools if point.name == ANY_TOOL else 1 for point in points if point.name != SINGLE_TOOL)
-    told = f"the highest of every instance, {len(cells)} cells{' and stored episodes' * len(episodes)} among them"
+    words = f"the highest of every instance, {len(cells)} cells{' and stored episodes' * len(episodes)} among them"
     best = [own[winner] for own, winner in zip(sources, returns.argmax(axis=0), strict=True)]
-    return Point(BEST_KNOWN, returns.max(axis=0), successes.max(axis=0), tools + len(cells), told, best)
+    return Point(BEST_KNOWN, returns.max(axis=0), successes.max(axis=0), tools + len(cells), words, best)
 
 
 def _episodes(task: Task, results: Path) -> list[Point]:

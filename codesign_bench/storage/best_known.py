@@ -30,6 +30,7 @@ from codesign_bench.storage.measurements import BEST_KNOWN_EPISODES
 from codesign_bench.storage.reading import DamagedFile
 from codesign_bench.storage.tables import read_table, write_table
 from codesign_bench.task import Singles, Task
+from codesign_bench.task.plans import designs_of, plan_size
 
 FOLDER = "best_known"
 LOCK_SECONDS = 60.0
@@ -108,7 +109,7 @@ def load_best_known(results: Path, task: Task) -> BestKnown:
     if table is None or set(table["task_version"]) != {task.version}:
         return BestKnown()
     plans = _plans(path.with_suffix(".safetensors"))
-    size, count = task.design_space.size + task.horizon * task.control_space.size, task.num_evaluation_instances
+    size, count = plan_size(task), task.num_evaluation_instances
     known = BestKnown()
     for row in table.to_dict("records"):
         plan = plans.get(row["plan"])
@@ -158,7 +159,7 @@ def _table(task: Task, known: BestKnown) -> Any:
 
     instances, rows = task.evaluation_instances(), []
     for episode in _episodes(known):
-        design = task.design_space.from_unit(np.clip(episode.plan[: task.design_space.size], -1.0, 1.0))
+        design = task.design_space.from_unit(np.clip(designs_of(task, episode.plan), -1.0, 1.0))
         named = (
             ("instance", task.instance_space.names, instances[episode.instance]),
             ("design", task.design_space.names, design),

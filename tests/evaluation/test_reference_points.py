@@ -15,7 +15,6 @@ import pytest
 from builders import sweep, toy_cells
 from codesign_bench import registry
 from codesign_bench.evaluation import reference_points
-from codesign_bench.evaluation.plans import plan_size
 from codesign_bench.evaluation.reference_points import (
     Point,
     best_known,
@@ -33,6 +32,7 @@ from codesign_bench.storage.reference_points import (
     load_reference_points,
 )
 from codesign_bench.task import Behaviour, Floats, Singles, Task, load_task, task_names
+from codesign_bench.task.plans import plan_size
 from toy import ToyReach
 
 GOALS = (0.2, 0.5, 0.8, 0.82)

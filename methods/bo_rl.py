@@ -19,11 +19,11 @@ from codesign_bench.config.values import Within
 from codesign_bench.errors import UserError
 from codesign_bench.learning.actor import ActorPolicy
 from codesign_bench.learning.bayesian import first_points, next_point
-from codesign_bench.learning.checkpointing import load_module_arrays, module_arrays
+from codesign_bench.learning.checkpointing import below, load_module_arrays, prefixed
 from codesign_bench.learning.explorer import Explorer, FixedDesigns, Trial
 from codesign_bench.learning.ppo_config import PerceptronConfig
 from codesign_bench.learning.trajectories import Trajectories
-from codesign_bench.method import BatchReport, Policy, Problem, State
+from codesign_bench.method import Array, BatchReport, Policy, Problem, State
 from codesign_bench.seeding import Streams
 
 from ._given_design import WITHOUT_EFFECT, GivenDesignMethod
@@ -72,7 +72,7 @@ class BoRl(GivenDesignMethod[Config]):
         self._left = 0
         """Steps that the candidate has left; 0: it has not begun."""
         self._judged_now = False
-        self._winner: dict[str, Any] = {}
+        self._winner: dict[str, Array] = {}
         self._searching = True
         self.actor.act_with(self._first[0])
 
@@ -135,21 +135,23 @@ class BoRl(GivenDesignMethod[Config]):
 
     def _share(self, remaining_steps: int) -> int:
         """Return the steps of the candidate that begins now: an equal part of what the search has left."""
-        kept = self._budget - int(self.config.search_share * self._budget)
-        return max(1, (remaining_steps - kept) // (self.config.candidates - len(self.scores)))
+        return max(1, (remaining_steps - self._rest) // (self.config.candidates - len(self.scores)))
+
+    @property
+    def _rest(self) -> int:
+        """Steps of the budget that are not for the search."""
+        return self._budget - int(self.config.search_share * self._budget)
 
     def _judge(self, batch: Trajectories, remaining_steps: int) -> None:
         """Give the candidate its score; begin the next, or go on with the best."""
         score = float(np.concatenate(batch.episode_returns).mean())
         if not self.scores or score > max(self.scores):
-            self._winner = self.learner.state().arrays
-            load_module_arrays(self._best_actor, module_arrays(self.actor))
+            self._keep(self.learner.state().arrays)
         self.designs = np.concatenate([self.designs, self.actor.best_design.numpy()[None].astype(np.float64)])
         self.scores.append(score)
         self._left, self._judged_now = 0, False
         tried = len(self.scores)
-        kept = self._budget - int(self.config.search_share * self._budget)
-        self._searching = tried < self.config.candidates and remaining_steps > kept
+        self._searching = tried < self.config.candidates and remaining_steps > self._rest
         self._begin_learner()
         if not self._searching:
             self.learner.load_state(State(self._winner, {"env_steps": 0}))
@@ -157,6 +159,11 @@ class BoRl(GivenDesignMethod[Config]):
             self.actor.act_with(self._first[tried])
         else:
             self.actor.act_with(next_point(self.designs, np.array(self.scores), self.streams["designs"]))
+
+    def _keep(self, winner: Mapping[str, Array]) -> None:
+        """Take a learner's arrays for those of the best candidate."""
+        self._winner = {name: np.array(array) for name, array in winner.items()}
+        load_module_arrays(self._best_actor, below("actor.", self._winner))
 
     def _begin_learner(self) -> None:
         """Replace the learner by a new one with new networks, on the same simulators and processes."""
@@ -174,22 +181,17 @@ class BoRl(GivenDesignMethod[Config]):
     def state(self) -> State:
         """Return the candidate's learner, the candidates so far, and the best of them."""
         state = super().state()
-        arrays = {WINNER + name: array for name, array in self._winner.items()} if self._searching else {}
         tried = {"candidates.designs": self.designs, "candidates.scores": np.array(self.scores)}
+        winner = prefixed(WINNER, self._winner) if self._searching else {}
         values = {"budget": self._budget, "left": self._left, "searching": self._searching}
-        return State({**state.arrays, **tried, **arrays}, {**state.values, **values})
+        return State({**state.arrays, **tried, **winner}, {**state.values, **values})
 
     def load_state(self, state: State) -> None:
         """Restore what `state` returned."""
-        arrays, values = dict(state.arrays), dict(state.values)
-        self.designs = np.array(arrays.pop("candidates.designs"))
-        self.scores = np.array(arrays.pop("candidates.scores")).tolist()
-        self._budget, self._left = int(values.pop("budget")), int(values.pop("left"))
-        self._searching = bool(values.pop("searching"))
-        names = [name for name in arrays if name.startswith(WINNER)]
-        self._winner = {name.removeprefix(WINNER): np.array(arrays.pop(name)) for name in names}
-        if self._winner:
-            prefix = "actor."
-            of_actor = {name: array for name, array in self._winner.items() if name.startswith(prefix)}
-            load_module_arrays(self._best_actor, {name.removeprefix(prefix): array for name, array in of_actor.items()})
-        super().load_state(State(arrays, values))
+        super().load_state(state)
+        self.designs = np.array(state.arrays["candidates.designs"])
+        self.scores = np.array(state.arrays["candidates.scores"]).tolist()
+        self._budget, self._left = int(state.values["budget"]), int(state.values["left"])
+        self._searching = bool(state.values["searching"])
+        if winner := below(WINNER, state.arrays):
+            self._keep(winner)

@@ -10,7 +10,7 @@ Shapes: `b` slots, `B` batch, `O` observation, `D` design, `Z` noise, `n` episod
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import torch
@@ -18,6 +18,7 @@ from torch import Tensor
 
 from codesign_bench.config.search import Integer, LogUniform
 from codesign_bench.config.values import Within
+from codesign_bench.learning.checkpointing import below, prefixed
 from codesign_bench.learning.contextual_cma import ContextFeatures, Distribution, mean_of
 from codesign_bench.learning.explorer import Explorer, Sample
 from codesign_bench.learning.ppo_config import PerceptronConfig
@@ -133,24 +134,18 @@ class ContextualCma(GivenDesignMethod[Config]):
     def state(self) -> State:
         """Return the learner's state, the rest of the search distribution, and the generation's episodes so far."""
         state, search = super().state(), self.search
-        arrays = {SEARCH + name: getattr(search, name) for name in ("covariance", "path", "sigma_path")}
-        gathered = {GATHERED + name: values for name, values in self._gathered.items()}
-        numbers = {"sigma": search.sigma, "generations": search.generations}
-        return State({**state.arrays, **arrays, **gathered}, state.values | numbers)
+        paths = {name: getattr(search, name) for name in ("covariance", "path", "sigma_path")}
+        arrays = {**state.arrays, **prefixed(SEARCH, paths), **prefixed(GATHERED, self._gathered)}
+        return State(arrays, {**state.values, "sigma": search.sigma, "generations": search.generations})
 
     def load_state(self, state: State) -> None:
         """Restore the learner's state and the search distribution."""
-        rest, values = dict(state.arrays), dict(state.values)
-        self._gathered = _taken(rest, GATHERED)
-        sigma, generations = float(values.pop("sigma")), int(values.pop("generations"))
-        paths = _taken(rest, SEARCH)
-        super().load_state(State(rest, values))
+        super().load_state(state)
+        self._gathered, paths = (
+            {name: np.array(array) for name, array in below(prefix, state.arrays).items()}
+            for prefix in (GATHERED, SEARCH)
+        )
+        sigma, generations = float(state.values["sigma"]), int(state.values["generations"])
         # The actor has the weights of the mean: it acts with them.
         weights = self.actor.weights.numpy().copy()
         self.search = Distribution(weights, sigma=sigma, generations=generations, **paths)
-
-
-def _taken(arrays: dict[str, Any], prefix: str) -> dict[str, Floats]:
-    """Remove the arrays with a prefix; return copies of them without it."""
-    names = [name for name in arrays if name.startswith(prefix)]
-    return {name.removeprefix(prefix): np.array(arrays.pop(name)) for name in names}

@@ -20,7 +20,7 @@ from torch import Tensor
 
 from codesign_bench.config.values import Within
 from codesign_bench.learning.actor import ActorPolicy
-from codesign_bench.learning.checkpointing import load_module_arrays, module_arrays
+from codesign_bench.learning.checkpointing import below, load_module_arrays, module_arrays, prefixed
 from codesign_bench.learning.ppo_config import PerceptronConfig
 from codesign_bench.learning.value_networks import MLPValue, ValueNetwork
 from codesign_bench.method import Array, Policy
@@ -94,7 +94,7 @@ class CriticPolicy(Policy):
 
     def tensors(self) -> dict[str, Array]:
         """Return the parameters of controller and critic."""
-        critic = {CRITIC + name: array for name, array in module_arrays(self.value).items()}
+        critic = prefixed(CRITIC, module_arrays(self.value))
         return {**module_arrays(self.actor), **critic}
 
 
@@ -119,7 +119,6 @@ class CriticDesign(GivenDesignMethod[Config]):
         """Return controller and critic with the given parameters."""
         actor = GivenDesignActor(task, config, np.random.default_rng(0))
         value = MLPValue(task, config.value_net, np.random.default_rng(0))
-        own = {name: array for name, array in tensors.items() if name.startswith(CRITIC)}
-        load_module_arrays(value, {name.removeprefix(CRITIC): array for name, array in own.items()})
-        load_module_arrays(actor, {name: array for name, array in tensors.items() if name not in own})
+        load_module_arrays(value, below(CRITIC, tensors))
+        load_module_arrays(actor, {name: array for name, array in tensors.items() if not name.startswith(CRITIC)})
         return CriticPolicy(actor, value, config)

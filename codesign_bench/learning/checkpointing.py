@@ -23,9 +23,9 @@ def learner_arrays(modules: Modules, optimizers: Optimizers) -> dict[str, Array]
     """Return copies of the state of `modules` and `optimizers` as arrays by name."""
     arrays: dict[str, Array] = {}
     for name, module in modules.items():
-        arrays |= _prefixed(f"{name}.", module_arrays(module))
+        arrays |= prefixed(f"{name}.", module_arrays(module))
     for name, optimizer in optimizers.items():
-        arrays |= _prefixed(f"optimizer.{name}.", optimizer_arrays(optimizer))
+        arrays |= prefixed(f"optimizer.{name}.", optimizer_arrays(optimizer))
     return arrays
 
 
@@ -37,9 +37,9 @@ def load_learner_arrays(modules: Modules, optimizers: Optimizers, arrays: Mappin
         RuntimeError: names or shapes differ from the modules' otherwise.
     """
     for name, module in modules.items():
-        load_module_arrays(module, _below(f"{name}.", arrays))
+        load_module_arrays(module, below(f"{name}.", arrays))
     for name, optimizer in optimizers.items():
-        load_optimizer_arrays(optimizer, _below(f"optimizer.{name}.", arrays))
+        load_optimizer_arrays(optimizer, below(f"optimizer.{name}.", arrays))
 
 
 def module_arrays(module: nn.Module) -> dict[str, Array]:
@@ -81,9 +81,11 @@ def load_optimizer_arrays(optimizer: torch.optim.Optimizer, arrays: Mapping[str,
     optimizer.load_state_dict({"state": state, "param_groups": optimizer.state_dict()["param_groups"]})
 
 
-def _prefixed(prefix: str, arrays: Mapping[str, Array]) -> dict[str, Array]:
+def prefixed(prefix: str, arrays: Mapping[str, Array]) -> dict[str, Array]:
+    """Return arrays with a prefix before their names."""
     return {f"{prefix}{name}": array for name, array in arrays.items()}
 
 
-def _below(prefix: str, arrays: Mapping[str, Array]) -> dict[str, Array]:
+def below(prefix: str, arrays: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the arrays whose names begin with a prefix, by their names without it."""
     return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}

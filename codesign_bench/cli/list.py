@@ -31,9 +31,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for title, members in (("methods", of_study), ("methods beyond", beyond)):
         if members:
             log(title)
-        told = {name: _tools(name) for name in members}
-        for name in sorted(members, key=lambda name: list(TOOLS.values()).index(told[name])):  # stable: else in order
-            log(f"  {name:{width}} {told[name]}".rstrip())
+        tools = {name: _tools(name) for name in members}
+        for words in TOOLS.values():
+            for name in [name for name in members if tools[name] == words]:
+                log(f"  {name:{width}} {words}".rstrip())
     for title, group in (("tasks", "tasks"), ("figures", "paper_figs")):
         log(title)
         for name in names(group):

@@ -71,12 +71,13 @@ def evaluate(
         tradeoff: added to the task's reward if given.
         instances: (N, I) in the instance space's units; None: the task's fixed evaluation instances.
         simulators: lend the simulator, and share the work if they use several cores; None: new ones, on one core.
-        observe: see `play`; the slots that it gets are those of one of the `portions` of the instances. Needs one core.
+        observe: see `play`; the slots that it gets are those of one of the `portions` of the instances. They are
+            then played in this process.
     """
     instances = task.evaluation_instances() if instances is None else instances
     shared = Simulators(task) if simulators is None else simulators
     plays = [_Play(policy, tradeoff, instances[part], observe) for part in portions(len(instances), task)]
-    parts = shared.share(_Play.run, plays)
+    parts = shared.share(_Play.run, plays) if observe is None else [_Play.run(shared, play) for play in plays]
     return Evaluation(
         **{field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Evaluation)}
     )

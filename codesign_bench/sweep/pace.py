@@ -203,6 +203,7 @@ def measure_here(resolved: ResolvedCell) -> Pace:
     """Train a cell in this process for some seconds, evaluate it once, and return its pace."""
     config, problem, budget = resolved.config, resolved.problem(), resolved.config.run.steps
     method = resolved.method_class(problem, config.method, Streams(resolved.cell.seed))
+    problem.simulators.use_cores(config.run.threads)
     method.use_cores(config.run.threads)
     method.use_device(config.run.device)
     done, begun = 0, time.monotonic()

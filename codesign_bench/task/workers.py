@@ -19,6 +19,9 @@ Resource = TypeVar("Resource")
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 
+CHUNKS_PER_WORKER = 4
+"""With fewer, a worker may wait long for the last."""
+
 _resource: Any = None
 """The resource of a worker process."""
 
@@ -40,7 +43,9 @@ class Workers(Generic[Resource]):
 
     def map(self, work: Callable[[Resource, Part], Result], parts: Sequence[Part]) -> list[Result]:
         """Return what `work` returns for a worker's resource and every one of `parts`, in their order."""
-        return list(self._pool.map(partial(_run, work), parts))
+        # What parts have in common, a policy for instance, is sent once for all parts that are sent together.
+        together = max(1, len(parts) // (CHUNKS_PER_WORKER * self.count))
+        return list(self._pool.map(partial(_run, work), parts, chunksize=together))
 
 
 def _prepare(make: Callable[[], Any], parent: int) -> None:

@@ -45,9 +45,9 @@ def test_episodes_are_renewed_and_reference_points_with_them(
     results = tmp_path / "runs"
     line = ["headroom", "--policy", str(cell), "--update", "--results", str(results), *SMALL]
     assert main(line) == 0
-    told = capsys.readouterr().out
-    assert "toy_reach: 8 instances improved" in told
-    assert "measure them with: codesign-bench reference --task toy_reach" in told
+    printed = capsys.readouterr().out
+    assert "toy_reach: 8 instances improved" in printed
+    assert "measure them with: codesign-bench reference --task toy_reach" in printed
     episodes = pd.read_csv(results / "best_known" / "toy_reach.csv")
     best = episodes.groupby("instance")["return"].max().mean()
     measure_missing(results, ["toy_reach"], [].append)

@@ -52,14 +52,14 @@ def returns(known: BestKnown) -> list[float]:
 
 def test_of_several_policies_the_best_counts_for_each_instance(task: Task, tmp_path: Path) -> None:
     cells = [cell_of(tmp_path, -1.0, seed=0), cell_of(tmp_path, 1.0, seed=1)]
-    told: list[str] = []
-    known = update(tmp_path, task, cells, NOTHING, told.append).known
+    lines: list[str] = []
+    known = update(tmp_path, task, cells, NOTHING, lines.append).known
     own = [pd.read_csv(cell.folder / "evaluation.csv")["return"] for cell in cells]
     assert returns(known) == pytest.approx(np.maximum(*own).tolist())
     assert_repeats(task, known)
     sources = {episode.source for (episode,) in known.episodes.values()}
     assert sources == {"toy_reach/toy_search/default/seed-00", "toy_reach/toy_search/default/seed-01"}
-    assert told == ["toy_reach: better episodes of 8 of 8 instances by 2 policies at hand"]
+    assert lines == ["toy_reach: better episodes of 8 of 8 instances by 2 policies at hand"]
     assert returns(load_best_known(tmp_path, task)) == returns(known)
 
 
@@ -73,7 +73,7 @@ def test_nothing_is_played_where_a_policy_is_no_better(
     assert (first.env_steps > 0, again.env_steps, again.improved) == (True, 0, set())
     assert path_of(tmp_path, "toy_reach").read_bytes() == before
     monkeypatch.setattr(best_known, "keeps_returns", lambda variant: False)
-    assert update(tmp_path, task, cells, NOTHING, [].append).env_steps > 0, "what it earns is not told by its table"
+    assert update(tmp_path, task, cells, NOTHING, [].append).env_steps > 0, "its table does not say what it earns"
 
 
 def test_a_policy_trained_for_another_reward_is_judged_by_the_tasks_own(task: Task, tmp_path: Path) -> None:
@@ -101,10 +101,10 @@ def test_cells_that_cannot_be_played_are_named_or_counted(task: Task, tmp_path: 
     without, damaged = cell_of(tmp_path, 0.0, seed=0), cell_of(tmp_path, 0.0, seed=1)
     (without.folder / POLICY_FILE).unlink()
     (damaged.folder / POLICY_FILE).write_bytes(b"no policy")
-    told: list[str] = []
-    assert update(tmp_path, task, [without, damaged], NOTHING, told.append).known.episodes == {}
-    assert told[0].startswith("passed over toy_reach/toy_search/default/seed-01: ")
-    assert told[1].endswith("by 1 policies at hand; 1 cells have none")
+    lines: list[str] = []
+    assert update(tmp_path, task, [without, damaged], NOTHING, lines.append).known.episodes == {}
+    assert lines[0].startswith("passed over toy_reach/toy_search/default/seed-01: ")
+    assert lines[1].endswith("by 1 policies at hand; 1 cells have none")
 
 
 def test_a_script_counts_like_a_policy(task: Task, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -121,8 +121,8 @@ def test_a_script_counts_like_a_policy(task: Task, tmp_path: Path, monkeypatch: 
 def test_a_search_finds_the_stick_that_touches_at_once_and_never_loses_anything(task: Task, tmp_path: Path) -> None:
     cells = [cell_of(tmp_path, 0.0)]
     before = update(tmp_path, task, cells, NOTHING, [].append).known
-    start, told = returns(before), list[str]()
-    state = update(tmp_path, task, cells, SHORT, told.append)
+    start, lines = returns(before), list[str]()
+    state = update(tmp_path, task, cells, SHORT, lines.append)
     after = returns(state.known)
     assert (np.array(after) >= np.array(start)).all()
     # A stick of 0.1 to 1 m that may move 0.1 m in its first step reaches every goal from 0 to 1 m.
@@ -131,7 +131,7 @@ def test_a_search_finds_the_stick_that_touches_at_once_and_never_loses_anything(
     assert_repeats(task, state.known)
     assert set(state.known.searched.values()) == {1 + 2 + 48}
     assert SEARCH in {one.source for (one,) in state.known.episodes.values()}
-    assert sum(" -> " in line for line in told) >= 6
+    assert sum(" -> " in line for line in lines) >= 6
     again = update(tmp_path, task, cells, SHORT, [].append, instances=3)
     assert sorted(again.known.searched.values()) == [51] * 5 + [102] * 3, "another search, of those searched least"
     assert (np.array(returns(again.known)) >= np.array(after)).all()
@@ -158,8 +158,8 @@ def test_an_interrupted_search_goes_on_with_the_instances_that_are_left(
     with pytest.raises(KeyboardInterrupt):
         update(tmp_path, task, [], SHORT, [].append)
     monkeypatch.setattr(best_known, "store", store)
-    told: list[str] = []
-    known = update(tmp_path, task, [], SHORT, told.append, instances=4).known
+    lines: list[str] = []
+    known = update(tmp_path, task, [], SHORT, lines.append, instances=4).known
     assert sorted(known.searched) == list(range(8))
     assert max(known.searched.values()) < 2 * SHORT.candidates, "none was searched twice"
 

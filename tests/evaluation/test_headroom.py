@@ -134,8 +134,8 @@ def test_a_cell_with_another_reward_is_judged_by_it(tmp_path: Path, toy: None) -
 
 @pytest.mark.usefixtures("toy")
 def test_every_instance_has_its_row_and_none_is_worse_than_the_designer(tmp_path: Path) -> None:
-    folder, told = toy_cell(tmp_path), list[str]()
-    path = measure_cell(folder, tmp_path, SMALL, told.append)
+    folder, lines = toy_cell(tmp_path), list[str]()
+    path = measure_cell(folder, tmp_path, SMALL, lines.append)
     assert path == tmp_path / "headroom" / "toy_reach-toy_search-seed-00.csv"
     table, evaluation = stored(path), pd.read_csv(folder / "evaluation.csv")
     assert table["designer_return"].tolist() == pytest.approx(evaluation["return"].tolist())
@@ -149,7 +149,7 @@ def test_every_instance_has_its_row_and_none_is_worse_than_the_designer(tmp_path
     assert (table.loc[same, "best_return"] == table.loc[same, "designer_return"]).all()
     assert (table.loc[~same, "best_return"] > table.loc[~same, "designer_return"]).all()
     assert set(table["candidates"]) == {24}
-    assert len(told) == 1
+    assert len(lines) == 1
     header, rows = summary([path])
     assert len(header) == len(rows[0])
     assert rows[0][:2] == ["toy_reach-toy_search-seed-00", "8"]
@@ -181,13 +181,13 @@ def test_what_was_measured_before_an_interruption_is_kept(tmp_path: Path, monkey
     with pytest.raises(KeyboardInterrupt):
         measure_cell(folder, tmp_path, SMALL, [].append)
     monkeypatch.setattr(headroom, "add_row", add_row)
-    told: list[str] = []
-    resumed = stored(measure_cell(folder, tmp_path, SMALL, told.append))
-    assert told[0].startswith("trying other tools on 5 instances of toy_reach/toy_search/default/seed-00")
+    lines: list[str] = []
+    resumed = stored(measure_cell(folder, tmp_path, SMALL, lines.append))
+    assert lines[0].startswith("trying other tools on 5 instances of toy_reach/toy_search/default/seed-00")
     pd.testing.assert_frame_equal(resumed, whole)
     before = (tmp_path / "headroom" / "toy_reach-toy_search-seed-00.csv").read_bytes()
-    measure_cell(folder, tmp_path, SMALL, told.append)
-    assert len(told) == 1
+    measure_cell(folder, tmp_path, SMALL, lines.append)
+    assert len(lines) == 1
     assert (tmp_path / "headroom" / "toy_reach-toy_search-seed-00.csv").read_bytes() == before
 
 

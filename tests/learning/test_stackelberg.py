@@ -83,6 +83,33 @@ def flat(parameters: list[Any]) -> Tensor:
     return torch.cat([parameter.detach().flatten() for parameter in parameters])
 
 
+def gradient(value: Tensor, parameters: list[Any], retain_graph: bool | None = None) -> Tensor:
+    """Return the gradient of a value in all parameters as one vector."""
+    found = torch.autograd.grad(value, parameters, retain_graph=retain_graph, materialize_grads=True)
+    return torch.cat([one.flatten() for one in found])
+
+
+def shift(parameters: list[Any], change: Tensor) -> None:
+    """Add to the parameters their parts of one vector."""
+    with torch.no_grad():
+        for parameter, part in zip(parameters, change.split([p.numel() for p in parameters]), strict=True):
+            parameter.add_(part.view_as(parameter))
+
+
+def fisher_matrix(follower: Follower, observation: Tensor) -> Tensor:
+    """Return the mean of J' S^-1 J over observations, J the slopes of the mean, and 2 for a log deviation."""
+    mean, log_std = follower.actor.control(observation)
+    size = sum(parameter.numel() for parameter in follower.parameters)
+    fisher = torch.zeros(size, size, dtype=torch.float64)
+    for row in range(len(observation)):
+        for entry in range(mean.shape[1]):
+            slope = gradient(mean[row, entry], follower.parameters, retain_graph=True)
+            fisher += torch.outer(slope, slope) / log_std[entry].detach().exp() ** 2 / len(observation)
+    deviation = follower.actor.control_log_std
+    of_std = torch.cat([torch.full((p.numel(),), float(p is deviation)) for p in follower.parameters])
+    return fisher + 2.0 * torch.diag(of_std.double())
+
+
 def test_the_response_is_that_to_a_damped_natural_step_of_the_controller(
     reach: Task, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -105,23 +132,8 @@ def test_the_response_is_that_to_a_damped_natural_step_of_the_controller(
     def control_log_prob() -> Tensor:
         return gaussian(*actor.control(steps.observation[rows]), steps.control[rows])[0]
 
-    def gradient(value: Tensor, parameters: list[Any]) -> Tensor:
-        found = torch.autograd.grad(value, parameters, materialize_grads=True)
-        return torch.cat([one.flatten() for one in found])
-
-    # The Fisher information: the mean of J' S^-1 J over rows, J the slopes of the mean, and 2 for a log deviation.
-    mean, log_std = actor.control(steps.observation[rows])
-    size = sum(parameter.numel() for parameter in follower.parameters)
-    fisher = torch.zeros(size, size, dtype=torch.float64)
-    for row in range(len(rows)):
-        for entry in range(mean.shape[1]):
-            slopes = torch.autograd.grad(
-                mean[row, entry], follower.parameters, retain_graph=True, materialize_grads=True
-            )
-            slope = torch.cat([one.flatten() for one in slopes])
-            fisher += torch.outer(slope, slope) / log_std[entry].detach().exp() ** 2 / len(rows)
-    of_std = torch.cat([torch.full((p.numel(),), float(p is actor.control_log_std)) for p in follower.parameters])
-    fisher += 2.0 * torch.diag(of_std.double())
+    damped = fisher_matrix(follower, steps.observation[rows])
+    damped += 0.7 * torch.eye(len(damped))
 
     # What the controller's parameters are worth to the designer: the slope of the clipped surrogate loss.
     controls, old = control_log_prob(), steps.log_prob[rows]
@@ -131,20 +143,16 @@ def test_the_response_is_that_to_a_damped_natural_step_of_the_controller(
         """Return where the controller's parameters go when each episode counts by the ratio of its design."""
         gains = ((control_log_prob() - old).exp() * advantage[rows]).view(6, 3).mean(1)
         push = gradient((ratio().detach() * gains).mean(), follower.parameters)
-        return flat(follower.parameters) + torch.linalg.solve(fisher + 0.7 * torch.eye(size), push)
+        return flat(follower.parameters) + torch.linalg.solve(damped, push)
 
     found = follower.response(ratio(), episodes, 1, leader).gradient
     for seed in range(3):
         way = torch.from_numpy(np.random.default_rng(seed).normal(size=len(found)))
         ends = []
         for sign in (1.0, -2.0):  # a step forth, and two back
-            with torch.no_grad():
-                for parameter, part in zip(leader, way.split([p.numel() for p in leader]), strict=True):
-                    parameter.add_(sign * 1e-6 * part.view_as(parameter))
+            shift(leader, sign * 1e-6 * way)
             ends.append(worth @ moved())
-        with torch.no_grad():
-            for parameter, part in zip(leader, way.split([p.numel() for p in leader]), strict=True):
-                parameter.add_(1e-6 * part.view_as(parameter))
+        shift(leader, 1e-6 * way)
         # The leader's loss after the controller has moved falls where the response term rises.
         assert float((ends[0] - ends[1]) / 2e-6) == pytest.approx(-float(found @ way), rel=1e-5)
     assert found.norm() > 1e-4

@@ -36,8 +36,8 @@ SOLVER_ITERATIONS: Annotated[int, Given("1", "PyBullet's own")] = 50
 """Iterations of the contact solver in every physics step."""
 BULLET_SCENE = {**CARRIER_SCENE, **constants(__name__)}
 """Constants of the tasks in PyBullet; a task may override them by name."""
-MAX_SLOTS = 8
-"""For `Task.max_slots`: an idle world takes over 20 MB, and physics costs far more than a call of the policy (ours)."""
+MAX_SLOTS = 28
+"""For `Task.max_slots`: an idle world takes over 20 MB, and a cell should stay below 1 GB (ours)."""
 Triple: TypeAlias = tuple[float, float, float]
 """Along x, y and z, or of width, length and height."""
 PLACE, ROTATION, VELOCITY, SPIN = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)

@@ -21,7 +21,7 @@ from codesign_bench.method import Problem
 from codesign_bench.seeding import Streams
 from codesign_bench.task.simulators import Simulators
 
-GROUP_SLOTS = 48
+GROUP_SLOTS = 96
 """Fewest slots of a group, unless the batch has fewer: smaller calls of the policy cost more per step."""
 
 

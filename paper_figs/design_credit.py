@@ -6,6 +6,7 @@ A dot is a seed, a bar the mean over the seeds of a cell's kind.
 from __future__ import annotations
 
 import math
+from textwrap import fill
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -27,6 +28,8 @@ AXIS = "credit"
 QUANTITIES = ("return_mean", "success_rate")
 NEEDED = ("task", "method", "label", "variant", "seed", "env_steps", *QUANTITIES)
 PANEL_HEIGHT = 1.5
+LABEL_WIDTH = 15
+"""Letters of a line of a label."""
 SPREAD = 0.08
 """Distance between neighbouring dots, in places of the axis."""
 
@@ -117,7 +120,8 @@ def _draw_panel(axes: Axes, table: pd.DataFrame, title: str) -> None:
         shift = [SPREAD * (index - 0.5 * (len(values) - 1)) for index in range(len(values))]
         axes.plot([place + offset for offset in shift], values, "o", color=colour, markersize=3.0)
         axes.plot([place - 0.3, place + 0.3], [values.mean()] * 2, color=colour, linewidth=1.2)
-    names = [str(label).replace(", ", "\n") for (_, label, _), _ in groups]
-    axes.set_xticks(range(len(groups)), names, fontsize=5)
+    # Neighbours' labels would overlap on one line each.
+    names = ["\n".join(fill(part, LABEL_WIDTH) for part in str(label).split(", ")) for (_, label, _), _ in groups]
+    axes.set_xticks(range(len(groups)), names, fontsize=4.5)
     axes.set_xlim(-0.6, len(groups) - 0.4)
     axes.set_title(title)

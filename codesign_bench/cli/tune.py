@@ -9,12 +9,14 @@ from pathlib import Path
 from rich.console import Console
 
 from codesign_bench.cli.arguments import (
+    ALL,
     OfKind,
     add_jobs,
     add_profile,
     add_same_code,
     add_study,
     add_sweep,
+    chosen_names,
     out_folder,
 )
 from codesign_bench.config.run_settings import Steps
@@ -30,6 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the study, the budget, the output folder, and how to run the cells; the size of the search is the study's."""
     add_study(parser)
     add_profile(parser)
+    parser.add_argument("--task", nargs="+", default=[ALL], metavar="T", help="some of the search, or all (default)")
+    parser.add_argument("--method", nargs="+", default=[ALL], metavar="M", help="the same for methods")
     parser.add_argument(
         "--steps", type=OfKind(Steps), metavar="N", help="budget of a cell in the last rung (default: the profile's)"
     )
@@ -44,15 +48,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Search, or print the plan; return 1 if a cell failed."""
-    from codesign_bench.tuning.tune import print_plan, tune, tuning_of, usable_part
+    from codesign_bench.tuning.tune import part_of, print_plan, tune, tuning_of, usable_part
 
     study = load_study(options.study)
+    whole = tuning_of(study)
+    tasks = chosen_names("tasks", options.task, {ALL: whole.tasks})
+    methods = chosen_names("methods", options.method, {ALL: whole.methods})
+    tuning = usable_part(part_of(whole, tasks, methods), printer(console))
     if options.plan:
-        print_plan(console, usable_part(tuning_of(study), printer(console)), options.profile, options.steps)
+        print_plan(console, tuning, options.profile, options.steps)
         return 0
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does
     return tune(
-        study,
+        study.name,
+        tuning,
         profile=options.profile,
         out=DEFAULT_FOLDER / study.name if options.out is None else options.out,
         console=console,

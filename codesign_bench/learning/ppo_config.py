@@ -68,7 +68,7 @@ class PPOConfig:
     """Whether state and goal are normalised by their running mean and standard deviation; False: by their bounds."""
     normalize_returns: bool = field(default=True, metadata=OURS)
     """Whether the value network learns returns normalised by their running mean and standard deviation."""
-    design_credit: Credit = "separate"
+    design_credit: Credit = "joint"
     """Credit of the design step: `joint` (the paper's) or `separate` (ours)."""
     batch_design: bool = field(default=False, metadata=OURS)
     """Under joint credit, whether an epoch's first minibatches hold all design steps; False spreads them over all."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,34 @@ from codesign_bench.storage.files import json_bytes, write_output
 from codesign_bench.storage.json_fields import text
 from codesign_bench.storage.layout import rows_bytes
 from codesign_bench.storage.reading import UnusableFile, read_json
+from codesign_bench.storage.tables import Content, Form, read_table
 from codesign_bench.study.tuning import Tuning
 from codesign_bench.tuning.scores import Score
 
 TABLE_FILE, WINNERS_FILE = "tuning.csv", "tuned.json"
 COLUMNS = ("task", "method", "setting", "rung", "steps", "seeds", "env_steps", "validation_return", "kept")
 """Columns of the table before those of the hyperparameters, which are empty where a method has none of the name."""
+
+FORM = Form({"task": Content.TEXT, "method": Content.TEXT})
+
+
+def check_tables(out: Path, tuning: Tuning) -> None:
+    """Check that the tables in `out` may be replaced: that this search includes what they tell of.
+
+    Raises:
+        UserError: they tell of other tasks or methods, or cannot be read.
+    """
+    try:
+        table = read_table(out / TABLE_FILE, FORM)
+    except UnusableFile as error:
+        raise UserError(f"cannot read '{out / TABLE_FILE}' ({error.reason}); give another --out") from error
+    if table is None:
+        return
+    known = set(zip(table["task"], table["method"], strict=True))
+    missing = sorted(known - set(product(tuning.tasks, tuning.methods)))
+    if missing:
+        others = ", ".join(f"{method} on {task}" for task, method in missing)
+        raise UserError(f"'{out}' has a search for {others}, too: name all of them, or give another --out")
 
 
 def write_table(out: Path, tuning: Tuning, scores: Sequence[Score], kept: Sequence[Score]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -18,7 +19,7 @@ from codesign_bench.study.study import Study
 from codesign_bench.study.tuning import FIRST_REPORTED_SEED, Tuning
 from codesign_bench.sweep.runner import EXIT_ALL_DONE, run_sweep
 from codesign_bench.task import usable_tasks
-from codesign_bench.tuning.results import TABLE_FILE, WINNERS_FILE, spent, write_table, write_winners
+from codesign_bench.tuning.results import TABLE_FILE, WINNERS_FILE, check_tables, spent, write_table, write_winners
 from codesign_bench.tuning.scores import Score, score, survivors
 from codesign_bench.tuning.settings import cells_in_turn, settings_of
 
@@ -32,6 +33,25 @@ def tuning_of(study: Study) -> Tuning:
     if study.tuning is None:
         raise UserError(f"the study '{study.name}' has no tuning; see docs/tuning.md")
     return study.tuning
+
+
+def part_of(tuning: Tuning, tasks: Sequence[str], methods: Sequence[str]) -> Tuning:
+    """Return the search on these of its tasks and for these of its methods alone.
+
+    Its size and its draws stay the same, so the cells are those of the whole search.
+
+    Raises:
+        UserError: a name that is not part of the search.
+    """
+    for kind, searched, chosen in (("task", tuning.tasks, tasks), ("method", tuning.methods, methods)):
+        for name in chosen:
+            if name not in searched:
+                raise UserError(f"--{kind} {name}: not part of the search; choose from: {', '.join(searched)}")
+    return replace(
+        tuning,
+        tasks=tuple(name for name in tuning.tasks if name in tasks),
+        methods=tuple(name for name in tuning.methods if name in methods),
+    )
 
 
 def usable_part(tuning: Tuning, log: Log) -> Tuning:
@@ -71,7 +91,8 @@ def budgets_of(tuning: Tuning, task: str, profile: str, steps: int | None) -> li
 
 
 def tune(
-    study: Study,
+    study: str,
+    tuning: Tuning,
     *,
     profile: str,
     out: Path,
@@ -83,16 +104,17 @@ def tune(
     scheduler: str | None = None,
     same_code: bool = False,
 ) -> int:
-    """Run the missing cells of the search and write its files; return 0, or 1 if some cell failed.
+    """Run the missing cells of a study's search and write its files; return 0, or 1 if some cell failed.
 
-    The rungs follow from the study and the stored cells alone, so the same call resumes an interrupted search.
+    The rungs follow from the search and the stored cells alone, so the same call resumes an interrupted search.
 
     Raises:
-        UserError: bad input, or a stored cell with another configuration.
+        UserError: bad input, a stored cell with another configuration, or `out` has the tables of a search for other
+            tasks or methods.
         KeyboardInterrupt: the user stopped the search.
     """
     log, code = printer(console), EXIT_ALL_DONE
-    tuning = usable_part(tuning_of(study), log)
+    check_tables(out, tuning)
     budgets = {task: budgets_of(tuning, task, profile, steps) for task in tuning.tasks}
     sweep = partial(
         run_sweep,
@@ -121,7 +143,7 @@ def tune(
         scores += found
         kept += winners
         write_table(out, tuning, scores, kept)
-    write_winners(out, {"study": study.name, "profile": profile}, tuning, scores, winners)
+    write_winners(out, {"study": study, "profile": profile}, tuning, scores, winners)
     conclude(log, out, profile, winners, scores)
     return code
 

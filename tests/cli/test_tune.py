@@ -30,12 +30,26 @@ def test_the_default_study_plans_the_same_for_all_of_its_methods(capsys: pytest.
     assert "the same for gnn_ppo, shared_arch, cma_rl, hwasp_minimal, cma_es" in capsys.readouterr().out
 
 
+def test_a_part_of_the_search_has_the_steps_of_the_whole_on_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tune", "--plan", "--task", "push", "--method", "cma_es", "cma_rl"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "push 2 2 1,000,000 4,000,000" in printed
+    assert "catch_balls" not in printed
+    assert "the same for cma_rl, cma_es: 11,999,992 steps each" in printed
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["--study", "neurips"], "unknown study 'neurips'"),
         (["--steps", "0"], "--steps: expected an integer from 1 to 1,000,000,000,000, not '0'"),
         (["--profile", "slow", "--plan"], "unknown profile 'slow'"),
+        (["--task", "scoop", "scooop"], "unknown task 'scooop'; choose from: "),
+        (
+            ["--task", "scoop", "--study", "corl2023", "--method", "pt_me"],
+            "--method pt_me: not part of the search; choose",
+        ),
+        (["--method", ","], "--method: no name given"),
         (["--jobs", "0"], "--jobs: expected an integer from 1 to 4,096, not '0'"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 
 from codesign_bench.errors import UserError
 from codesign_bench.study import Tuning
-from codesign_bench.tuning.results import read_winners, spent, write_table, write_winners
+from codesign_bench.tuning.results import check_tables, read_winners, spent, write_table, write_winners
 from codesign_bench.tuning.scores import Score
 from codesign_bench.tuning.settings import Setting
 
@@ -35,6 +36,23 @@ def test_the_table_has_a_row_for_every_setting_and_rung(tmp_path: Path) -> None:
     assert table["seeds"].tolist() == ["0 1"] * 5
     assert table["rate"].dropna().tolist() == [0.5, 0.25, 0.25]
     assert table["size"].dropna().tolist() == [8.0, 8.0]
+
+
+def test_tables_are_replaced_by_a_search_that_includes_theirs_alone(tmp_path: Path) -> None:
+    check_tables(tmp_path, TUNING)
+    write_table(tmp_path, TUNING, SCORES, [])
+    check_tables(tmp_path, TUNING)
+    check_tables(tmp_path, replace(TUNING, methods=("a", "b", "c")))
+    with pytest.raises(UserError, match="has a search for b on t, too: name all of them, or give another --out"):
+        check_tables(tmp_path, replace(TUNING, methods=("a", "c")))
+
+
+@pytest.mark.parametrize("content", ["", "task,method\n1,", "a,b\n1,2\n"])
+def test_tables_that_cannot_be_read_are_not_replaced(tmp_path: Path, content: str) -> None:
+    (tmp_path / "tuning.csv").write_text(content)
+    with pytest.raises(UserError, match=r"cannot read '.*tuning\.csv' \(.+\); give another --out"):
+        check_tables(tmp_path, TUNING)
+    assert (tmp_path / "tuning.csv").read_text() == content
 
 
 def test_steps_of_all_rungs_are_added_up() -> None:

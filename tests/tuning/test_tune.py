@@ -143,6 +143,20 @@ def test_a_finished_search_runs_nothing_again(searched: tuple[Path, str]) -> Non
     assert records(searched[0]) == before
 
 
+def test_a_search_may_be_extended_but_not_cut_down(searched: tuple[Path, str], tmp_path: Path) -> None:
+    part = finish(start("--method", "toy_aim", "--out", tmp_path))
+    assert "the same for toy_aim: 600 steps each" in " ".join(part.split())
+    assert set(table(tmp_path)["method"]) == {"toy_aim"}
+    before = records(tmp_path)
+    assert "6 cells, 3 of them already done" in finish(start("--out", tmp_path))
+    assert {path: records(tmp_path)[path] for path in before} == before
+    tables = {name: (tmp_path / name).read_bytes() for name in ("tuning.csv", "tuned.json")}
+    assert tables == {name: (searched[0] / name).read_bytes() for name in tables}
+    arguments = [argument for argument in TUNE if argument != "tune"]
+    assert main(["tune", *arguments, "--method", "toy_search", "--out", str(tmp_path)]) == 2
+    assert tables == {name: (tmp_path / name).read_bytes() for name in tables}
+
+
 def test_a_setting_that_fails_goes_no_further(tmp_path: Path) -> None:
     arguments = ("--import", "toy_failing", "--study", "toy_failing", "--steps", "30", "--out", str(tmp_path))
     assert main(["tune", *arguments]) == 1

@@ -1,6 +1,6 @@
 """The paper's own framework: goal-conditioned designer and controller as graph networks, trained jointly by PPO.
 
-With `design_credit="joint"`, as in the profile `paper`. With `separate`, the default, it is our variant of it.
+With `design_credit="joint"`, the default. With `separate`, it is our variant of it.
 
 Source: the paper, sections "Policy learning" and "Training Hyperparameters & Architecture Details for Our Framework".
 """

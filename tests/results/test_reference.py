@@ -40,6 +40,8 @@ DEFAULTS = [cell for cell in CELLS if cell.record.variant == DEFAULT]
 FIRST = [next(group) for _, group in groupby(DEFAULTS, lambda cell: (cell.record.task, cell.record.method))]
 """One cell of each task and method; cells come in the order of their folders."""
 PLAYABLE = [cell for cell in FIRST if (cell.folder / POLICY_FILE).exists()]
+CREDIT = "design_credit: stored separate, requested joint"
+"""The default that changed since the cells were run, as the page of the results says."""
 FIRST_TRIALS = load_deployment(REFERENCE).query("kind == 'own' and trial == 1 and success == 1")
 TOOLS_THAT_WORKED = FIRST_TRIALS.groupby("task")[["task", "tool"]].tail(1).values.tolist()
 """Of each task on an arm, one tool that succeeded in its first trial."""
@@ -148,11 +150,13 @@ def test_the_evaluation_of_a_shipped_cell_is_the_end_of_its_curve() -> None:
 
 
 @pytest.mark.parametrize("cell", FIRST, ids=name_of)
-def test_the_profile_of_a_shipped_cell_still_means_what_it_was_run_with(cell: StoredCell) -> None:
+def test_the_profile_of_a_shipped_cell_still_means_what_it_was_run_with_but_for_the_credit(cell: StoredCell) -> None:
     skip_if_its_task_has_changed(cell)
     record = cell.record
     wanted = Cell(record.task, record.method, record.seed, record.variant, record.profile)
-    assert differences(record.config, resolve_cell(wanted).config) == []
+    found = differences(record.config, resolve_cell(wanted).config)
+    assert [line for line in found if line != CREDIT] == []
+    assert (CREDIT in found) == ("design_credit" in record.config.parts["method"])
 
 
 def test_every_shipped_tool_was_tried_equally_often() -> None:

@@ -5,7 +5,7 @@ uniformly in every episode, and a controller and a value network that see it. No
 several designs are moved up the gradient of the value of the first control step, and the one of the highest value is
 built. An evaluation plays it, so a value that the critic only imagines earns nothing.
 
-Shapes: `B` batch, `K` starts, `O` observation, `D` design.
+Shapes: `B` batch, `K` starts, `P` designs that are judged, `O` observation, `D` design.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from codesign_bench.learning.checkpointing import below, load_module_arrays, mod
 from codesign_bench.learning.ppo_config import PerceptronConfig
 from codesign_bench.learning.value_networks import MLPValue, ValueNetwork
 from codesign_bench.method import Array, Policy
-from codesign_bench.task import Singles, Task
+from codesign_bench.task import Floats, Singles, Task
 
 from ._given_design import WITHOUT_EFFECT, GivenDesignActor, GivenDesignMethod
 
@@ -63,6 +63,14 @@ class CriticPolicy(Policy):
         batch = np.atleast_2d(np.asarray(observation, dtype=np.float32))
         designs = np.stack([self._climbed(torch.from_numpy(each)).numpy() for each in batch])
         return designs if np.ndim(observation) == 2 else designs[0]
+
+    def design_values(self, observation: Singles, designs: Singles) -> Floats:
+        """Return the critic's values (P,) of designs (P, D) after one observation (O,)."""
+        with torch.no_grad():
+            found = self.values(
+                *(torch.from_numpy(np.asarray(each, dtype=np.float32)) for each in (observation, designs))
+            )
+        return found.numpy().astype(np.float64)
 
     def values(self, observation: Tensor, designs: Tensor) -> Tensor:
         """Return the critic's values (K,) of the first control step with designs (K, D) after one observation (O,)."""

@@ -29,10 +29,11 @@ from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
 from codesign_bench.method import Policy, Problem
 from codesign_bench.seeding import generator
 from codesign_bench.storage.cells import StoredCell, open_cell
-from codesign_bench.storage.headroom import QUANTITIES, TOOLS, add_row, path_of, rows_of
+from codesign_bench.storage.headroom import QUANTITIES, TOOLS, VALUES_FOLDER, add_rows, path_of, rows_of
 from codesign_bench.storage.layout import POLICY_FILE
+from codesign_bench.storage.measurements import DESIGN_VALUES
 from codesign_bench.storage.policies import policy_of, problem_of
-from codesign_bench.task import EVALUATION_SEED, Floats, Singles
+from codesign_bench.task import EVALUATION_SEED, Floats, Singles, Slots
 from codesign_bench.task.behaviours import GivenDesigns
 from codesign_bench.task.episodes import portions
 from codesign_bench.task.play import first_observations
@@ -97,12 +98,16 @@ class Controller:
 
     def designs(self) -> Singles:
         """Return the designer's own tool for each instance, (N, D) in [-1, 1]."""
-        parts = []
-        for part in portions(len(self.instances), self.problem.task):
-            with self.problem.episodes(len(part)) as episodes:
-                seen = first_observations(episodes, self.instances[part])
-                parts.append(np.clip(np.asarray(self.policy.design(seen), dtype=UNIT), -1.0, 1.0))
+        parts = [
+            np.clip(np.asarray(self.policy.design(self.observations(part)), dtype=UNIT), -1.0, 1.0)
+            for part in portions(len(self.instances), self.problem.task)
+        ]
         return np.concatenate(parts)
+
+    def observations(self, instances: Slots) -> Singles:
+        """Return the observations (B, O) of the design phase of the instances with these numbers (B,)."""
+        with self.problem.episodes(len(instances)) as episodes:
+            return first_observations(episodes, self.instances[instances])
 
     def play(self, instance: int, designs: Singles) -> tuple[Floats, Floats, int]:
         """Return returns (P,) and successes (P,) of designs (P, D) on an instance, and the environment steps taken."""
@@ -142,6 +147,12 @@ def measure_cell(
     path = path_of(results, cell.record)
     known = rows_of(path)
     _refuse_other(path, known, {"policy": policy_name, "task_version": cell.record.task_version, **asdict(budget)})
+    values_path = path_of(results, cell.record, VALUES_FOLDER)
+    _refuse_other(
+        values_path,
+        rows_of(values_path, DESIGN_VALUES),
+        {"policy": policy_name, "task_version": cell.record.task_version},
+    )
     done = {row["instance"] for row in known}
     count = len(controller.instances)
     missing = [index for index in range(count if instances is None else min(instances, count)) if index not in done]
@@ -150,8 +161,11 @@ def measure_cell(
         tools = controller.designs()
         calls = (delayed(_measure)(folder, policy_name, tools, index, budget) for index in missing)
         try:
-            for row in Parallel(n_jobs=jobs, return_as="generator_unordered")(calls):
-                add_row(results, path, row)
+            for row, judged in Parallel(n_jobs=jobs, return_as="generator_unordered")(calls):
+                # The row comes last, because it says that the instance is done.
+                if judged:
+                    add_rows(results, values_path, judged, DESIGN_VALUES)
+                add_rows(results, path, [row])
         finally:
             _controller.cache_clear()  # its simulator must not outlive this module, nor take memory any longer
     return path
@@ -232,15 +246,17 @@ def _generations(
         yield Tried(designs, returns, successes, [SEARCH] * len(designs), env_steps)
 
 
-def _measure(folder: Path, policy_name: str, tools: Singles, index: int, budget: Budget) -> dict[str, Any]:
-    """Return the row of one instance."""
+def _measure(
+    folder: Path, policy_name: str, tools: Singles, index: int, budget: Budget
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return the row of one instance, and those of the tools that the policy judges, none if it does not judge any."""
     cell, controller = open_cell(folder), _controller(folder, policy_name)
     task, record = controller.problem.task, cell.record
     tried = measure_instance(controller, tools, index, budget)
     best = int(tried.returns.argmax())
     others = tried.origins.count(OTHER)
     returns, successes = tried.of(OTHER if others else DESIGNER)  # of a single instance there is no other
-    row = {
+    own = {
         "task": record.task,
         "task_version": record.task_version,
         "method": record.method,
@@ -249,6 +265,9 @@ def _measure(folder: Path, policy_name: str, tools: Singles, index: int, budget:
         "label": record.label or record.method,
         "policy": policy_name,
         "instance": index,
+    }
+    row = {
+        **own,
         "designer_return": tried.returns[0],
         "designer_success": tried.successes[0],
         # As with reference points, return and success are the highest, each by itself.
@@ -269,7 +288,30 @@ def _measure(folder: Path, policy_name: str, tools: Singles, index: int, budget:
     )
     for kind, names, values in named:
         row |= {f"{kind}_{name}": float(value) for name, value in zip(names, values, strict=True)}
-    return row
+    return row, [{**own, **judged} for judged in judgements(controller, index, tried)]
+
+
+def judgements(controller: Controller, index: int, tried: Tried) -> list[dict[str, Any]]:
+    """Return rows of the designer's own tool and of the random ones: as the policy judges them, and as they played.
+
+    Those of the search are left out: they crowd together where the returns are high, and would say little of whether
+    the policy tells good designs from bad ones. Nothing is returned for a policy that does not judge designs.
+    """
+    chosen = [number for number, origin in enumerate(tried.origins) if origin in (DESIGNER, RANDOM)]
+    (observation,) = controller.observations(np.array([index]))
+    values = controller.policy.design_values(observation, tried.designs[chosen])
+    if values is None:
+        return []
+    return [
+        {
+            "tool": tool,
+            "origin": tried.origins[number],
+            "value": float(value),
+            "return": tried.returns[number],
+            "success": tried.successes[number],
+        }
+        for tool, (number, value) in enumerate(zip(chosen, values, strict=True))
+    ]
 
 
 @lru_cache(maxsize=1)

@@ -71,6 +71,13 @@ def headroom(request: Request) -> pd.DataFrame:
     return load_headroom(request.results)
 
 
+def design_values(request: Request) -> pd.DataFrame:
+    """Return the tools that policies judged and that were played, one row per cell, instance and tool."""
+    from codesign_bench.storage.headroom import load_design_values
+
+    return load_design_values(request.results)
+
+
 def timing(request: Request) -> pd.DataFrame:
     """Return the training times of cells and the inference times of their policies."""
     from codesign_bench.evaluation.timing import timing_frame

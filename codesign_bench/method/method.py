@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from codesign_bench.errors import UserError
 from codesign_bench.method.problem import Problem
 from codesign_bench.seeding import Streams
-from codesign_bench.task import Behaviour, Task
+from codesign_bench.task import Behaviour, Floats, Singles, Task
 
 Array = NDArray[Any]
 
@@ -28,6 +28,18 @@ class Policy(Behaviour):
     @abstractmethod
     def tensors(self) -> dict[str, Array]:
         """Return all arrays of the policy, by name; `Method.make_policy` restores the policy from them."""
+
+    def design_values(self, observation: Singles, designs: Singles) -> Floats | None:
+        """Return what the policy itself expects of designs, or None if it does not judge designs.
+
+        Args:
+            observation: (O,) of the design phase.
+            designs: (P, D) in [-1, 1].
+
+        Returns:
+            (P,) values in any unit, higher for a design that it prefers.
+        """
+        return None
 
 
 @dataclass

@@ -1,13 +1,15 @@
 """The tables of headroom beside the cells: what other tools earn with a finished cell's controller, per instance.
 
-OUT/headroom/<task>-<method>[-<variant>]-seed-00.csv   one row per evaluation instance, with the form `HEADROOM`
+OUT/headroom/<task>-<method>[-<variant>]-seed-00.csv        one row per evaluation instance, with the form `HEADROOM`
+OUT/design_values/<task>-<method>[-<variant>]-seed-00.csv   with the form `DESIGN_VALUES`: one row per tool and
+                                                            instance, of policies that judge designs themselves
 
 Rows are added one by one as they are measured and never replaced, also if several processes measure one cell.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,15 +20,15 @@ from codesign_bench.errors import UserError
 from codesign_bench.storage.files import saying_why
 from codesign_bench.storage.layout import open_folder
 from codesign_bench.storage.locks import locked
-from codesign_bench.storage.measurements import HEADROOM, REFERENCE_INSTANCES, usable, usable_tables
+from codesign_bench.storage.measurements import DESIGN_VALUES, HEADROOM, REFERENCE_INSTANCES, usable, usable_tables
 from codesign_bench.storage.records import CellRecord
 from codesign_bench.storage.reference_points import BEST_KNOWN, INSTANCES_FILE
-from codesign_bench.storage.tables import read_table, write_table
+from codesign_bench.storage.tables import Measurements, read_table, write_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FOLDER = "headroom"
+FOLDER, VALUES_FOLDER = "headroom", "design_values"
 TOOLS = ("designer", "best", "other", "random")
 """Whose tool: the designer's own, the best that was found, the designer's best for another goal, a random one."""
 KNOWN = "known"
@@ -36,20 +38,20 @@ LOCK_SECONDS = 60.0
 """Longest wait for another process that is writing a table."""
 
 
-def path_of(results: Path, record: CellRecord) -> Path:
-    """Return the path of the table of a cell below `results`."""
+def path_of(results: Path, record: CellRecord, folder: str = FOLDER) -> Path:
+    """Return the path of the table of a cell in a folder below `results`."""
     variant = [] if record.variant.name == DEFAULT_NAME else [record.variant.name]
     name = "-".join([record.task, record.method, *variant, f"seed-{record.seed:02d}"])
-    return results / FOLDER / f"{name}.csv"
+    return results / folder / f"{name}.csv"
 
 
-def rows_of(path: Path) -> list[dict[str, Any]]:
-    """Return the rows in a table, none if there is no table.
+def rows_of(path: Path, kind: Measurements = HEADROOM) -> list[dict[str, Any]]:
+    """Return the rows in a table of a kind, none if there is no table.
 
     Raises:
         UnusableFile: it cannot be used.
     """
-    table = read_table(path, HEADROOM.form)
+    table = read_table(path, kind.form)
     return (
         [] if table is None else [{str(name): value for name, value in row.items()} for row in table.to_dict("records")]
     )
@@ -68,8 +70,8 @@ def of_cell(results: Path, record: CellRecord, policy: str) -> pd.DataFrame | No
     return table[own].reset_index(drop=True)
 
 
-def add_row(results: Path, path: Path, row: Mapping[str, Any]) -> None:
-    """Add the row of an instance to a table, in order of instances, unless the table has one by now.
+def add_rows(results: Path, path: Path, rows: Sequence[Mapping[str, Any]], kind: Measurements = HEADROOM) -> None:
+    """Add the rows of an instance to a table of a kind, in order of instances, unless the table has them by now.
 
     Raises:
         UserError: the folder is not writable, or the table cannot be used.
@@ -81,9 +83,9 @@ def add_row(results: Path, path: Path, row: Mapping[str, Any]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
     try:
         with locked(path.parent, LOCK_SECONDS):
-            rows = rows_of(path)
-            if row["instance"] not in {known["instance"] for known in rows}:
-                table = pd.DataFrame([*rows, row]).sort_values("instance", kind="stable")
+            known = rows_of(path, kind)
+            if not {row["instance"] for row in rows} & {row["instance"] for row in known}:
+                table = pd.DataFrame([*known, *rows]).sort_values("instance", kind="stable")
                 write_table(results, path, table)
     except filelock.Timeout:
         raise UserError(f"--results {results}: another process holds the lock of {path.parent}") from None
@@ -111,3 +113,20 @@ def load_headroom(results: Path) -> pd.DataFrame:
     keys = ["task", "task_version", "instance"]
     renamed = known[[*keys, *QUANTITIES]].rename(columns={name: f"{KNOWN}_{name}" for name in QUANTITIES})
     return table.merge(renamed, on=keys, how="left", validate="many_to_one")
+
+
+def load_design_values(results: Path) -> pd.DataFrame:
+    """Return the tools that policies judged and played, one row per cell, instance and tool, with the tables' columns.
+
+    Raises:
+        UserError: nothing is measured yet.
+    """
+    import pandas as pd
+
+    tables = usable_tables(results, DESIGN_VALUES)
+    if not tables:
+        raise UserError(
+            "no policy that judges designs itself is measured yet; measure one with: "
+            f"codesign-bench headroom --policy CELL --results {results}"
+        )
+    return pd.concat(tables, ignore_index=True)

@@ -7,6 +7,7 @@ OUT/cutout_regions/<task>-<method>.csv                     policies with and wit
 OUT/deployment/<task>/protocol*.csv                        trials on an arm
 OUT/best_known/<task>.csv                                  the best episodes that are known of every instance
 OUT/headroom/<task>-<method>[-<variant>]-seed-00.csv       other tools under a policy's controller
+OUT/design_values/<task>-<method>[-<variant>]-seed-00.csv  tools as a policy judges them, and as they play
 """
 
 from __future__ import annotations
@@ -165,6 +166,28 @@ HEADROOM = Measurements(
         unique=("instance",),
     ),
 )
+DESIGN_VALUES = Measurements(
+    "design_values/*.csv",
+    Form(
+        {
+            "task": TEXT,
+            "task_version": WHOLE,
+            "method": TEXT,
+            "variant": TEXT,
+            "seed": WHOLE,
+            "label": TEXT,
+            "policy": TEXT,
+            "instance": WHOLE,
+            "tool": WHOLE,
+            "origin": TEXT,
+            "value": NUMBER,
+            "return": NUMBER,
+            "success": SHARE,
+        },
+        unique=("instance", "tool"),
+        alike=("instance",),
+    ),
+)
 BEST_KNOWN_EPISODES = Measurements(
     "best_known/*.csv",
     Form(
@@ -192,6 +215,7 @@ ALL = (
     CUTOUT_REGIONS,
     DEPLOYMENT,
     HEADROOM,
+    DESIGN_VALUES,
     BEST_KNOWN_EPISODES,
 )
 

@@ -5,7 +5,7 @@ Shapes: `N` evaluation instances, `P` tools, `D` design, `B` batch.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,12 +24,14 @@ from codesign_bench.evaluation.headroom import (
     SEARCH,
     Budget,
     Controller,
+    judgements,
     measure_cell,
     measure_instance,
     summary,
 )
 from codesign_bench.method import Array, Policy, Problem
 from codesign_bench.storage.cells import open_cell
+from codesign_bench.storage.headroom import load_design_values
 from codesign_bench.storage.policies import policy_of
 from codesign_bench.task import Floats, Singles, load_task
 from codesign_bench.task.episodes import Tradeoff
@@ -168,19 +170,19 @@ def test_the_stored_tool_earns_what_is_stored(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("toy")
 def test_what_was_measured_before_an_interruption_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder, added, add_row = toy_cell(tmp_path), list[int](), headroom.add_row
+    folder, added, add_rows = toy_cell(tmp_path), list[int](), headroom.add_rows
 
-    def interrupted(results: Path, path: Path, row: Mapping[str, Any]) -> None:
+    def interrupted(results: Path, path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         if len(added) == 3:
             raise KeyboardInterrupt
-        added.append(row["instance"])
-        add_row(results, path, row)
+        added.append(rows[0]["instance"])
+        add_rows(results, path, rows)
 
     whole = stored(measure_cell(folder, tmp_path / "undisturbed", SMALL, [].append))
-    monkeypatch.setattr(headroom, "add_row", interrupted)
+    monkeypatch.setattr(headroom, "add_rows", interrupted)
     with pytest.raises(KeyboardInterrupt):
         measure_cell(folder, tmp_path, SMALL, [].append)
-    monkeypatch.setattr(headroom, "add_row", add_row)
+    monkeypatch.setattr(headroom, "add_rows", add_rows)
     lines: list[str] = []
     resumed = stored(measure_cell(folder, tmp_path, SMALL, lines.append))
     assert lines[0].startswith("trying other tools on 5 instances of toy_reach/toy_search/default/seed-00")
@@ -232,3 +234,46 @@ def test_designs_of_the_designer_are_those_that_it_plays() -> None:
     designs: Floats = Controller(_AsLongAsTheGoalIsFar(), Problem(ToyReach())).designs()
     goals = ToyReach().evaluation_instances()
     assert designs == pytest.approx(np.clip((goals - 0.55) / 0.45, -1.0, 1.0), abs=1e-6)
+
+
+class _LikesLongSticks(ConstantPolicy):
+    """A stick of one length for all goals, with the opinion that a longer one is better, the more so the farther."""
+
+    def design_values(self, observation: Singles, designs: Singles) -> Floats:
+        """Return (P,) the length in [-1, 1], plus the distance of the goal."""
+        return np.asarray(designs[:, 0] + observation[ToyReach().layout.goal], dtype=np.float64)
+
+
+def test_what_a_policy_expects_of_designs_stands_beside_what_they_earned() -> None:
+    controller = Controller(_LikesLongSticks(np.array([0.3, 0.0])), Problem(ToyReach()))
+    tried = measure_instance(controller, controller.designs(), 1, SMALL)
+    rows = judgements(controller, 1, tried)
+    goal = controller.instances[1, 0]
+    assert [row["origin"] for row in rows] == [DESIGNER] + [RANDOM] * SMALL.random_tools
+    assert [row["tool"] for row in rows] == list(range(1 + SMALL.random_tools))
+    played = [number for number, origin in enumerate(tried.origins) if origin in (DESIGNER, RANDOM)]
+    assert [row["return"] for row in rows] == tried.returns[played].tolist()
+    assert [row["value"] for row in rows] == pytest.approx((tried.designs[played, 0] + goal).tolist(), abs=1e-6)
+
+
+def test_a_policy_that_does_not_judge_designs_has_no_values() -> None:
+    controller = toy_controller(length=0.3)
+    assert judgements(controller, 0, measure_instance(controller, controller.designs(), 0, SMALL)) == []
+
+
+@pytest.mark.usefixtures("toy")
+def test_the_values_of_a_finished_cell_are_kept_and_not_mixed_with_another_policys(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ConstantPolicy, "design_values", _LikesLongSticks.design_values)
+    measure_cell(toy_cell(tmp_path), tmp_path, SMALL, [].append, instances=3)
+    table = load_design_values(tmp_path)
+    assert len(table) == 3 * (1 + SMALL.random_tools)
+    assert set(table["origin"]) == {DESIGNER, RANDOM}
+    (path,) = (tmp_path / "design_values").glob("*.csv")
+    before = path.read_bytes()
+    (tmp_path / "headroom" / path.name).unlink()
+    other = toy_cell(tmp_path / "other", length=0.9)
+    with pytest.raises(UserError, match=r"design_values.*was measured otherwise \(policy: stored sha256"):
+        measure_cell(other, tmp_path, SMALL, [].append)
+    assert path.read_bytes() == before

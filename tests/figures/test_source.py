@@ -14,6 +14,7 @@ from codesign_bench.figures.source import (
     curves,
     curves_with_references,
     design_sensitivity,
+    design_values,
     evaluations,
     headroom,
     tasks_in,
@@ -66,7 +67,17 @@ def test_what_was_measured_is_read_and_nothing_is_measured_for_a_figure_that_nob
 
 
 @pytest.mark.parametrize(
-    "source", [curves, curves_with_references, evaluations, design_sensitivity, headroom, timing, trials_on_an_arm]
+    "source",
+    [
+        curves,
+        curves_with_references,
+        evaluations,
+        design_sensitivity,
+        design_values,
+        headroom,
+        timing,
+        trials_on_an_arm,
+    ],
 )
 def test_a_source_without_data_says_how_to_make_some(source: object, tmp_path: Path) -> None:
     assert callable(source)

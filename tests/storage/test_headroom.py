@@ -13,7 +13,7 @@ from codesign_bench.cell.variant import Variant
 from codesign_bench.errors import UserError
 from codesign_bench.storage import headroom
 from codesign_bench.storage.cells import open_cell
-from codesign_bench.storage.headroom import add_row, load_headroom, of_cell, path_of, rows_of
+from codesign_bench.storage.headroom import add_rows, load_headroom, of_cell, path_of, rows_of
 from codesign_bench.storage.locks import LOCK_FILE
 from codesign_bench.storage.measurements import HEADROOM, REFERENCE_INSTANCES
 from codesign_bench.storage.reading import UnusableFile
@@ -32,7 +32,7 @@ def test_rows_are_added_in_order_and_the_first_of_an_instance_stays(tmp_path: Pa
     path = tmp_path / "headroom" / "push-gnn_ppo-seed-00.csv"
     assert rows_of(path) == []
     for instance, earned in ((3, 1.0), (1, 2.0), (3, 9.0)):
-        add_row(tmp_path, path, row_of(instance, best_return=earned))
+        add_rows(tmp_path, path, [row_of(instance, best_return=earned)])
     assert [(row["instance"], row["best_return"]) for row in rows_of(path)] == [(1, 2.0), (3, 1.0)]
 
 
@@ -57,16 +57,16 @@ def test_a_damaged_table_is_named_and_stays(tmp_path: Path) -> None:
     (tmp_path / "codesign-bench.json").write_text("{}")
     before = path.read_bytes()
     with pytest.raises(UnusableFile, match=path.name):
-        add_row(tmp_path, path, row_of(1))
+        add_rows(tmp_path, path, [row_of(1)])
     assert path.read_bytes() == before
 
 
 def test_another_process_that_never_ends_writing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(headroom, "LOCK_SECONDS", 0.0)
     path = tmp_path / "headroom" / "push-gnn_ppo-seed-00.csv"
-    add_row(tmp_path, path, row_of(0))
+    add_rows(tmp_path, path, [row_of(0)])
     with filelock.FileLock(path.parent / LOCK_FILE), pytest.raises(UserError, match="another process holds the lock"):
-        add_row(tmp_path, path, row_of(1))
+        add_rows(tmp_path, path, [row_of(1)])
 
 
 def test_rows_come_with_the_best_known_of_their_instance(tmp_path: Path) -> None:

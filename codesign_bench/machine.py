@@ -108,18 +108,27 @@ def total_gpu_megabytes() -> float | None:
 
 
 def peak_megabytes() -> float:
-    """Return the peak memory of this process plus that of the largest of its ended children.
+    """Return the peak memory of this process plus those of its children that are still there, such as its workers.
 
-    The maximum in `getrusage` survives `exec`, so it may be that of the parent process. On systems with /proc, the
-    maximum of only this program is used.
+    Ended children do not count. `getrusage` has the largest of them, but a child that was started for another program
+    has its parent's memory for a moment, so it would count the parent twice.
     """
     import resource  # there is none on Windows
 
-    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    status = Path("/proc/self/status")
-    if status.exists():
-        own = int(re.search(r"^VmHWM:\s+(\d+) kB", status.read_text(), re.MULTILINE)[1])  # type: ignore[index]  # Linux always has this line.
-    return round((own + resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) / 1024.0, 1)
+    own = _peak_kilobytes("self")
+    if own is None:  # no /proc; this maximum survives `exec`, so it may be that of the parent process
+        return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0, 1)
+    children = (pid for path in Path("/proc/self/task").glob("*/children") for pid in path.read_text().split())
+    return round((own + sum(_peak_kilobytes(pid) or 0 for pid in children)) / 1024.0, 1)
+
+
+def _peak_kilobytes(pid: str) -> int | None:
+    """Return the peak memory of a process, or None if it has ended, or the system has no /proc."""
+    try:
+        found = re.search(r"^VmHWM:\s+(\d+) kB", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)
+    except OSError:
+        return None
+    return None if found is None else int(found[1])
 
 
 def _flags() -> set[str]:

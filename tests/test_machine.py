@@ -7,6 +7,7 @@ import os
 import platform
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from codesign_bench.machine import (
     computes_in_bfloat16,
     host_facts,
     package_versions,
+    peak_megabytes,
 )
 
 BOUND = pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="this system binds no process to cores")
@@ -84,3 +86,17 @@ def test_bfloat16_is_known_by_the_flags_of_the_processor() -> None:
     lines = subprocess.run(["cat", "/proc/cpuinfo"], capture_output=True, text=True).stdout
     told = any(f" {flag} " in f"{line} " for line in lines.splitlines() for flag in ("amx_bf16", "avx512_bf16", "bf16"))
     assert computes_in_bfloat16() == told
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="there is no /proc")
+def test_the_peak_counts_workers_that_are_there_and_no_program_that_has_ended() -> None:
+    held = "import sys; block = bytearray(b'1' * 100_000_000); print('ready', flush=True); sys.stdin.read()"
+    before = peak_megabytes()
+    subprocess.run(["true"], check=True)
+    assert peak_megabytes() < before + 20.0
+    with subprocess.Popen([sys.executable, "-c", held], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as worker:
+        assert worker.stdout is not None
+        worker.stdout.readline()
+        assert 90.0 < peak_megabytes() - before < 300.0
+        worker.communicate()
+    assert peak_megabytes() < before + 20.0

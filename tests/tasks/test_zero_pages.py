@@ -1,0 +1,86 @@
+"""Pages of zeros are given back: less memory is resident, and every byte stays what it was."""
+
+from __future__ import annotations
+
+import mmap
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+zero_pages: Any = import_module("codesign_bench.tasks._zero_pages")
+
+PAGE = mmap.PAGESIZE
+MAPS = """\
+00400000-00401000 r-xp 00000000 08:02 173521 /usr/bin/program
+00e03000-00e24000 rw-p 00000000 00:00 0 [heap]
+7f0000000000-7f0000010000 rw-p 00000000 00:00 0
+7f0000020000-7f0000030000 rw-p 00000000 08:02 99 /usr/lib/a file.so
+7f0000040000-7f0000050000 ---p 00000000 00:00 0
+7f0000060000-7f0000070000 rw-s 00000000 00:00 0
+7ffc00000000-7ffc00021000 rw-p 00000000 00:00 0 [stack]
+"""
+
+
+def test_only_private_memory_without_a_file_is_looked_at() -> None:
+    assert zero_pages.private_regions(MAPS) == [(0xE03000, 0xE24000), (0x7F0000000000, 0x7F0000010000)]
+
+
+@pytest.mark.parametrize(
+    ("others", "left"),
+    [
+        ([], [(10, 20)]),
+        ([(0, 10), (20, 30)], [(10, 20)]),
+        ([(0, 12)], [(12, 20)]),
+        ([(12, 14), (16, 25)], [(10, 12), (14, 16)]),
+        ([(5, 25)], []),
+        ([(10, 20)], []),
+    ],
+)
+def test_memory_that_was_there_before_is_left_alone(others: list[tuple[int, int]], left: list[tuple[int, int]]) -> None:
+    assert list(zero_pages.without((10, 20), others)) == left
+
+
+def resident_kilobytes() -> int:
+    """Return how much memory of this process is resident."""
+    lines = Path("/proc/self/smaps_rollup").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("Rss:"))
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="nothing is given back on other systems")
+def test_zeros_are_given_back_and_everything_reads_as_before() -> None:
+    pages = 4096
+    with zero_pages.zeros_given_back():
+        block = mmap.mmap(-1, pages * PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+        array = np.frombuffer(block, dtype=np.uint8)
+        array[:] = 0  # touches every page, so that all are resident
+        array[1000 * PAGE + 5] = 7
+        array[-1] = 9
+        before = resident_kilobytes()
+    freed = before - resident_kilobytes()
+    assert freed > 0.9 * pages * PAGE / 1024
+    assert array.sum() == 16
+    assert (array[1000 * PAGE + 5], array[-1]) == (7, 9)
+    array[2000 * PAGE] = 1
+    assert array.sum() == 17
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="nothing is given back on other systems")
+def test_short_runs_and_what_was_there_before_stay() -> None:
+    block = mmap.mmap(-1, 256 * PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    array = np.frombuffer(block, dtype=np.uint8)
+    array[:] = 0
+    before = resident_kilobytes()
+    with zero_pages.zeros_given_back():
+        pass
+    assert resident_kilobytes() > before - 128 * PAGE / 1024
+
+
+def test_other_systems_do_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "platform", "darwin")
+    monkeypatch.setattr(zero_pages, "MAPS", Path("/nowhere"))
+    with zero_pages.zeros_given_back():
+        pass

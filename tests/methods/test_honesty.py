@@ -28,11 +28,11 @@ MakeMethod = Callable[..., Method[Any]]
 PPO_BASED = ("gnn_ppo", "shared_arch", "hwasp_minimal")
 BUDGET = 10_000
 RATES = {"policy_learning_rate", "value_learning_rate"}
-DESIGN = {"design_learning_rate", "design_kl_threshold"}
+DESIGN = {"design_credit", "design_learning_rate", "design_kl_threshold"}
 TOLD = {
     ("shared_arch", "paper"): RATES,  # The paper's table of baselines prints their rates, one for all tasks.
     ("cma_rl", "paper"): RATES,
-    ("hwasp_minimal", "laptop"): DESIGN,  # A bare vector needs larger steps than a network: tuned for it (ours).
+    ("hwasp_minimal", "laptop"): DESIGN,  # A bare vector needs larger steps than a network (ours).
     ("hwasp_minimal", "quick"): DESIGN,
 }
 """In what a baseline differs from the paper's own method on some task, of the settings that both have."""

@@ -35,7 +35,7 @@ TUNED: Tuned = {
     "laptop": {"design_credit": "separate", "design_learning_rate": 2e-2, "design_kl_threshold": 0.3},
     "quick": {},
 }
-"""Settings tuned for this baseline (ours). A bare vector needs larger steps than a network, and joint credit gives it the
+"""Settings tuned for this baseline (ours). A bare vector needs larger steps than a network; joint credit gives it the
 controller's."""
 
 

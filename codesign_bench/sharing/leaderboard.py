@@ -9,7 +9,8 @@ Shapes: `N` seeds.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,18 +23,21 @@ from codesign_bench.sharing.finals import Finals, Scales, finals_of
 from codesign_bench.stats import MIN_SEEDS, Estimate, mean_across, mean_t_interval
 from codesign_bench.storage.archive import SUFFIX, Manifest, read_manifest
 from codesign_bench.storage.places import unpacked
-from codesign_bench.storage.provenance import SHORT
+from codesign_bench.storage.provenance import NOT_RECORDED, SHORT
 from codesign_bench.storage.reference_points import stored_references
 from codesign_bench.text_tables import markdown
+from codesign_bench.visible_text import on_one_line
 
 OWN = "codesign-bench"
 """The maintainers' archive, without the ending; it comes first and gives the scale."""
-NOT_STATED = "not stated"
+NOT_STATED, STATED, NOTHING = "not stated", "in words below", "-"
+DAY = len("2026-01-01")
+NAME = re.compile(r"[A-Za-z0-9._-]+")
 PLACE, METHOD, ARCHIVE, SEEDS, SCORE = "place", "method", "archive", "seeds", "score"
 STEPS, TUNING = "steps a cell", "tuning steps"
 SUMMARY = (PLACE, METHOD, ARCHIVE, SEEDS, SCORE, STEPS, TUNING)
 OF_A_TASK = (PLACE, METHOD, ARCHIVE, SEEDS, SCORE, "return", "success", STEPS, TUNING)
-ARCHIVES = (ARCHIVE, "title", "by", "cells", "policies", "last cell", "commits", "note")
+ARCHIVES = (ARCHIVE, "title", "by", "cells", "policies", "last cell", "commits (cells)", "tuning", "note")
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ def submissions(folder: Path) -> tuple[list[Submission], Scales]:
         UnusableFile: an archive is damaged.
         UserError: the maintainers' archive is missing.
     """
-    paths = sorted(folder.glob(f"*{SUFFIX}"), key=lambda path: (path.stem != OWN, path.stem))
+    paths = _archives(folder)
     if not paths or paths[0].stem != OWN:
         raise UserError(f"no {OWN}{SUFFIX} in '{folder}', which gives the scale of all scores")
     found = []
@@ -86,8 +90,12 @@ def submissions(folder: Path) -> tuple[list[Submission], Scales]:
     return found, stored_references(unpacked(paths[0]))
 
 
-def leaderboard(folder: Path) -> str:
+def leaderboard(folder: Path, link: str) -> str:
     """Return the leaderboard of the archives in a folder as Markdown: all tasks, each task, and the archives.
+
+    Args:
+        folder: holds the archives.
+        link: where a link of the page finds the folder.
 
     Raises:
         UserError: as `submissions` does.
@@ -97,8 +105,22 @@ def leaderboard(folder: Path) -> str:
         *_over_all_tasks(found, scales),
         *(_of_a_task(scene, found, scales) for scene in _scenes(found)),
         f"## Archives\n\n{markdown(ARCHIVES, [_about(submission) for submission in found])}",
+        "\n".join(f"- [{path.name}]({link}/{path.name})" for path in _archives(folder)),
     ]
-    return "\n".join(parts)
+    return "\n".join(parts) + "\n"
+
+
+def _archives(folder: Path) -> list[Path]:
+    """Return the archives in a folder, the maintainers' own first.
+
+    Raises:
+        UserError: the name of one could not be in a link.
+    """
+    paths = sorted(folder.glob(f"*{SUFFIX}"), key=lambda path: (path.stem != OWN, path.stem))
+    for path in paths:
+        if not NAME.fullmatch(path.name):
+            raise UserError(f"'{on_one_line(str(path))}': name an archive by letters, digits, '.', '-' and '_' alone")
+    return paths
 
 
 def _scenes(found: Iterable[Submission]) -> list[tuple[str, int]]:
@@ -160,5 +182,56 @@ def _score(final: Finals, scales: Scales) -> Estimate:
     return Estimate(float(scores.mean()), *mean_t_interval(scores))
 
 
-def _rows(lines: Iterable[Line], row: object) -> list[tuple[str, ...]]:
-    raise NotImplementedError
+def _rows(lines: Iterable[Line], cells: Callable[[Line], Sequence[str]]) -> list[tuple[str, ...]]:
+    """Return the rows of a table; a method with too few seeds or without a score has no place."""
+    rows = []
+    for place, line in enumerate(sorted(lines, key=lambda line: line.order), start=1):
+        ranked = line.seeds >= MIN_SEEDS and not math.isnan(line.score.value)
+        rows.append((str(place) if ranked else NOTHING, *cells(line)))
+    return rows
+
+
+def _summary_row(line: Line) -> tuple[str, ...]:
+    return (*_named(line), _interval(line.score), *_budgets(line))
+
+
+def _task_row(line: Line) -> tuple[str, ...]:
+    (final,) = line.finals
+    means = (f"{final.returns.mean():.2f}", f"{final.successes.mean():.2f}")
+    return (*_named(line), _interval(line.score), *means, *_budgets(line))
+
+
+def _named(line: Line) -> tuple[str, ...]:
+    return line.finals[0].label, line.submission.name, str(line.seeds)
+
+
+def _budgets(line: Line) -> tuple[str, str]:
+    """Return the environment steps of a cell, mean over tasks and seeds, and of tuning, summed over tasks."""
+    cell = np.mean([final.env_steps for final in line.finals])
+    spent = [line.submission.tuning(final) for final in line.finals]
+    known = [steps for steps in spent if steps is not None]
+    in_words = STATED if line.submission.manifest.tuning_note else NOT_STATED
+    return f"{cell:,.0f}", f"{sum(known):,}" if len(known) == len(spent) else in_words
+
+
+def _interval(found: Estimate) -> str:
+    if math.isnan(found.value):
+        return NOTHING
+    return f"{found.value:.2f}" + ("" if math.isnan(found.low) else f" [{found.low:.2f}, {found.high:.2f}]")
+
+
+def _about(submission: Submission) -> tuple[str, ...]:
+    """Return the row of an archive."""
+    told = submission.manifest
+    commits = [f"{(code.get('commit') or NOT_RECORDED)[:SHORT]} ({code.get('cells')})" for code in told.code]
+    return (
+        submission.name,
+        told.title or NOTHING,
+        told.by or NOTHING,
+        str(told.cells),
+        str(told.policies),
+        told.ended[:DAY] or NOTHING,
+        ", ".join(commits),
+        told.tuning_note or NOTHING,
+        told.note or NOTHING,
+    )

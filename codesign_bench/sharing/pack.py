@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -125,7 +126,7 @@ def spent_on_tuning(given: Sequence[str]) -> tuple[dict[str, dict[str, int]], st
     steps: dict[str, dict[str, int]] = {}
     words = []
     for told in given:
-        if not Path(told).is_dir():
+        if not os.path.isdir(told):
             words.append(f"{int(told):,} steps" if COUNT.fullmatch(told) else told)
             continue
         found = [cell.record for cell in find_cells(Path(told))]

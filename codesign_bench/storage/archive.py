@@ -158,8 +158,12 @@ class Manifest:
         if not isinstance(code, list) or not all(isinstance(part, dict) for part in code):
             raise ValueError("'code' is not a list of objects")
         return cls(
-            **{name: _told(content, name) for name in ("title", "by", "note", "ended")},
-            **{name: optional(whole, content, name) or 0 for name in ("cells", "policies")},
+            title=_told(content, "title"),
+            by=_told(content, "by"),
+            note=_told(content, "note"),
+            ended=_told(content, "ended"),
+            cells=optional(whole, content, "cells") or 0,
+            policies=optional(whole, content, "policies") or 0,
             packed_by=optional(entries, content, "packed_by") or {},
             code=tuple(code),
             versions=_counts(optional(entries, content, "versions") or {}),

@@ -13,7 +13,6 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-import codesign_bench
 from codesign_bench.errors import UserError
 from codesign_bench.storage.archive import SUFFIX, is_archive, unpack
 from codesign_bench.storage.files import reason_of
@@ -141,7 +140,7 @@ def _installed() -> Path | None:
 
 def _checked_out() -> Path | None:
     """Return the shipped results beside the code, where it is a checkout."""
-    folder = Path(codesign_bench.__file__).resolve().parents[1] / IN_CHECKOUT
+    folder = Path(__file__).resolve().parents[2] / IN_CHECKOUT
     return folder if (folder / MARKER_FILE).exists() else None
 
 

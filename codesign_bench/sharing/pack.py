@@ -61,7 +61,7 @@ def pack(results: Path, out: Path, order: Order, log: Log) -> Manifest:
     """
     if out.suffix.lower() != SUFFIX:
         raise UserError(f"--out {out}: the name must end in {SUFFIX}")
-    if out.exists():
+    if os.path.lexists(out):
         raise UserError(f"--out {out}: the file exists, and no archive is replaced; choose another name")
     for name in ("title", "by", "note"):
         if len(getattr(order, name)) > LONGEST_NOTE:

@@ -175,7 +175,7 @@ class Manifest:
 
 def is_archive(folder: Path) -> bool:
     """Return whether a results folder is an unpacked archive, which is only read."""
-    return (folder / ARCHIVE_FILE).exists()
+    return os.path.exists(folder / ARCHIVE_FILE)
 
 
 def limit_of(name: str) -> int | None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -67,7 +68,7 @@ def refuse_archive(out: Path) -> None:
     Raises:
         UserError: it is an unpacked archive, whose checksums hold only as long as nothing is added.
     """
-    if (out / ARCHIVE_FILE).exists():
+    if os.path.exists(out / ARCHIVE_FILE):
         raise UserError(f"'{out.name}' is an archive of results, which is only read; give a results folder of your own")
 
 

@@ -67,13 +67,14 @@ check: .venv/installed-test ## check style and types alone
 slow: .venv/installed-test ## run the slow tests: killed sweeps, learning, wheels
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -m slow
 
-package: ## build wheel and source archive, install the wheel in a new environment, run it
+package: ## build the wheels of program and reference results, install them in a new environment, run it
 	PYTHON=$(PYTHON) TORCH_INDEX=$(TORCH_INDEX) .ci/package
 
 install: .venv/installed-test ## set up an environment for development in .venv
 
 clean: ## remove the environment and what tools left behind; results stay
 	rm -rf .venv build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache
+	rm -rf reference_package/build reference_package/*.egg-info reference_package/codesign_bench_reference/reference
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .venv/made:

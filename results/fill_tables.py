@@ -19,6 +19,7 @@ from codesign_bench.claims.evidence import load_evidence
 from codesign_bench.claims.verify import Row, by_rule, contradicted, judge
 from codesign_bench.figures.source import Request, curves_with_references
 from codesign_bench.registry import in_order, load_module
+from codesign_bench.sharing.leaderboard import leaderboard
 from codesign_bench.storage.reference_points import FILE, POINTS, load_reference_points
 from codesign_bench.study import DEFAULT_STUDY, load_study
 from codesign_bench.text_tables import markdown
@@ -26,13 +27,15 @@ from codesign_bench.text_tables import markdown
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "results" / "reference"
 LONGER = ROOT / "results" / "longer"
+SUBMISSIONS = ROOT / "results" / "submissions"
 PAGES = {
     ROOT / "README.md": REFERENCE,
     ROOT / "docs" / "reference_points.md": REFERENCE,
+    ROOT / "docs" / "leaderboard.md": SUBMISSIONS,
     REFERENCE / "README.md": REFERENCE,
     LONGER / "README.md": LONGER,
 }
-"""Every page and the results that its tables show."""
+"""Every page and the results, or the folder of archives, that its tables show."""
 PAPERS_METHOD = "gnn_ppo"
 NOT_MEASURED = "Reference points of these results are not measured yet.\n"
 TABLE = re.compile(r"(<!-- (?P<name>\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -103,6 +106,7 @@ MAKERS: dict[str, Callable[[Path], str]] = {
     "success": _success,
     "reference_points": _reference_points,
     "script": _script,
+    "leaderboard": lambda folder: leaderboard(folder, "../results/submissions"),
     "claims": lambda results: by_rule(_judged(results)),
     "contradicted": lambda results: contradicted(_judged(results)),
 }

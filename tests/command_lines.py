@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from codesign_bench.cell.axes import BUILT_IN
-from codesign_bench.cli.arguments import OfKind, module_name, out_file, out_folder, path
+from codesign_bench.cli.arguments import OfKind, module_name, out_file, out_folder, own_results, path
 from codesign_bench.cli.program import build_parser
 from codesign_bench.config.run_settings import RunSettings
 from codesign_bench.config.validation import kinds_of
@@ -53,6 +53,8 @@ REQUIRED = {
     "export": ("--policy", "nowhere", "--out", "new"),
     "reference": ("--task", "push"),
     "headroom": ("--update",),
+    "compare": ("nowhere", "elsewhere"),
+    "pack": ("nowhere", "--out", "new.zip"),
     "bench sweep": ("--task", "push", "--method", "cma_es"),
 }
 """What each command needs before anything else can be wrong; others need nothing."""
@@ -100,7 +102,7 @@ def invalid_values(action: argparse.Action) -> Iterator[str]:
         yield from ("", "x", "CPU", LONG)
     elif isinstance(action.type, OfKind):
         yield from outside(action.type.kind)
-    elif action.type in (path, out_folder, out_file):
+    elif action.type in (path, out_folder, out_file, own_results):
         yield from NO_PATH
         yield from [] if action.type is path else ["/dev/null/new", "/dev/null/new/file.png"]
     elif action.type is module_name:
@@ -151,7 +153,9 @@ def of_names() -> Iterator[Line]:
         for action in parser._actions:
             for option in set(action.option_strings) & set(meant):
                 for name in ("no_such_name", "PUSH", "push/..", "\x1b[2J", LONG):
-                    if words[0] not in ("deploy", "export") and not (option == "--profile" and words[0] == "tune"):
+                    if words[0] not in ("compare", "deploy", "export") and not (
+                        option == "--profile" and words[0] == "tune"
+                    ):
                         yield Line((*words, *needed, option, name), meant[option])
 
 

@@ -31,6 +31,7 @@ from codesign_bench.seeding import generator
 from codesign_bench.storage import provenance
 from codesign_bench.storage.cells import find_cells
 from codesign_bench.storage.files import Outputs, json_bytes
+from codesign_bench.storage.places import shown
 from codesign_bench.text_tables import markdown, plain_markdown
 from codesign_bench.visible_text import on_one_line
 
@@ -149,7 +150,7 @@ def verify(
     if measure:
         _measure(claims, evidence, results, log)
         evidence = load_evidence(results)
-    rows = judge(claims, evidence, str(results))
+    rows = judge(claims, evidence, shown(results))
     made = provenance.differences({results.name: provenance.records_of(find_cells(results))})
     paths = write_rows(rows, study, results, out, made, left_out)
     print_rows(rows, console)
@@ -242,7 +243,7 @@ def as_json(
     return {
         "version": __version__,
         "study": study.name,
-        "results": str(results),
+        "results": shown(results),
         "made": list(made),
         "left_out": list(left_out),
         "interval": {"confidence": stats.CONFIDENCE},
@@ -283,7 +284,7 @@ def as_markdown(
     rules = {row.claim.rule.kind: (row.claim.rule.statistic, row.claim.rule.words) for row in asked}
     parts = [
         f"# {study.title}: what the results say of its claims\n",
-        f"Results: `{on_one_line(str(results))}`. {plain_markdown(summary(rows))}. {HOW_SURE}\n",
+        f"Results: `{on_one_line(shown(results))}`. {plain_markdown(summary(rows))}. {HOW_SURE}\n",
         by_rule(asked),
         "## Contradicted\n",
         contradicted(asked),

@@ -16,6 +16,7 @@ from codesign_bench.config.values import parse_value, printable, shown
 from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError, unknown_name
 from codesign_bench.registry import KINDS, names
+from codesign_bench.storage.places import REFERENCE
 from codesign_bench.study import DEFAULT_STUDY, load_study
 from codesign_bench.visible_text import visible
 
@@ -31,13 +32,17 @@ Jobs = Threads
 
 
 def add_results(parser: argparse.ArgumentParser, check: Callable[[str], Path] | None = None) -> None:
-    """Add `--results`, the folder that a command reads; `check` is another parser, for one that also writes there."""
+    """Add `--results`, what a command reads; `check` is another parser, for a command that also writes there.
+
+    `results_folder` finds what is given without another parser: a folder, an archive or the shipped results.
+    """
+    kinds = f", an archive of `pack`, or `{REFERENCE}`" if check is None else ""
     parser.add_argument(
         "--results",
         type=check or path,
         default=DEFAULT_RESULTS,
         metavar="DIR",
-        help=f"results folder; default: {DEFAULT_RESULTS}",
+        help=f"results folder{kinds}; default: {DEFAULT_RESULTS}",
     )
 
 
@@ -151,6 +156,18 @@ def out_folder(text: str) -> Path:
     """
     chosen = path(text)
     _check_writable(chosen, text)
+    return chosen
+
+
+def own_results(text: str) -> Path:
+    """Return the path of a results folder that is also written.
+
+    Raises:
+        ArgumentTypeError: it cannot be, or is the name of the shipped results.
+    """
+    chosen = out_folder(text)
+    if chosen == Path(REFERENCE) and not chosen.exists():
+        raise argparse.ArgumentTypeError(f"'{REFERENCE}' names the shipped results, which are only read; give a folder")
     return chosen
 
 

@@ -24,7 +24,13 @@ CONDITIONS = ("arm", "observation_noise", "latency", "friction", "mass")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the policy, the trials and their conditions."""
-    parser.add_argument("--policy", type=path, required=True, metavar="CELL", help="folder of a finished cell")
+    parser.add_argument(
+        "--policy",
+        type=path,
+        required=True,
+        metavar="CELL",
+        help="finished cell, also RESULTS.zip/... or reference/...",
+    )
     parser.add_argument("--task", metavar="T", help="default: the task of --policy")
     parser.add_argument(
         "--protocol", action="store_true", help="the paper's Table 1: five trials of each tool and the grid of starts"

@@ -20,7 +20,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the policy, the instances whose tools are written, and the folder."""
     # argparse would read a value such as `-0.2,0.7` as an option: its own pattern matches single numbers only.
     parser._negative_number_matcher = re.compile(r"^-\.?\d")
-    parser.add_argument("--policy", type=path, required=True, metavar="CELL", help="folder of a finished cell")
+    parser.add_argument(
+        "--policy",
+        type=path,
+        required=True,
+        metavar="CELL",
+        help="finished cell, also RESULTS.zip/... or reference/...",
+    )
     parser.add_argument("--task", metavar="T", help="default: the task of --policy")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--start", metavar="X,Y", help="the tool for an object that starts at this position, m")

@@ -8,6 +8,7 @@ from rich.console import Console
 
 from codesign_bench.cli.arguments import DEFAULT_FIGURES, add_out, add_results, add_study, path
 from codesign_bench.console import printer, tell_left_out
+from codesign_bench.storage.places import REFERENCE
 from codesign_bench.study import load_study
 
 HELP = "draw figures from results"
@@ -25,17 +26,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_results(parser)
     add_out(parser, DEFAULT_FIGURES)
     parser.add_argument(
-        "--compare", type=path, metavar="DIR", help="overlay the learning curves of these results, dashed"
+        "--compare",
+        type=path,
+        metavar="DIR",
+        help=f"overlay the learning curves of these results, dashed: a folder, an archive of `pack`, or `{REFERENCE}`",
     )
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Draw the figures and print their paths."""
     from codesign_bench.figures.drawing import draw_figures
+    from codesign_bench.storage.places import results_folder
     from codesign_bench.storage.survey import lines, survey
 
     study = load_study(options.study)
-    for results in filter(None, (options.results, options.compare)):
-        tell_left_out(lines(results, survey(results)))
-    draw_figures(options.figures, options.results, options.out, printer(console), options.compare, study)
+    results = results_folder(options.results)
+    compare = None if options.compare is None else results_folder(options.compare, must_exist=True)
+    for folder in filter(None, (results, compare)):
+        tell_left_out(lines(folder, survey(folder)))
+    draw_figures(options.figures, results, options.out, printer(console), compare, study)
     return 0

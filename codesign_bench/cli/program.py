@@ -39,6 +39,8 @@ COMMANDS = (
     "plot",
     "verify",
     "report",
+    "compare",
+    "pack",
     "reproduce",
     "reference",
     "headroom",

@@ -21,7 +21,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the behaviour, the task and the output file."""
     parser.add_argument("--task", metavar="T", help="default: the task of --policy")
     parser.add_argument(
-        "--policy", type=path, metavar="CELL", help="folder of a finished cell, whose final policy is used"
+        "--policy",
+        type=path,
+        metavar="CELL",
+        help="finished cell whose final policy is used, also RESULTS.zip/... or reference/...",
     )
     parser.add_argument(
         "--behaviour", choices=("random", "script"), help="used without --policy; default: the task's script"

@@ -23,8 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     """Write the page and print its path."""
     from codesign_bench.report.page import write_report
+    from codesign_bench.storage.places import results_folder
     from codesign_bench.storage.survey import lines, survey
 
-    tell_left_out(lines(options.results, survey(options.results)))
-    write_report(options.results, options.out, printer(console), load_study(options.study))
+    results = results_folder(options.results)
+    tell_left_out(lines(results, survey(results)))
+    write_report(results, options.out, printer(console), load_study(options.study))
     return 0

@@ -12,6 +12,7 @@ from codesign_bench.cli.arguments import add_results
 from codesign_bench.console import print_table, printer, tell_left_out
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import scan
+from codesign_bench.storage.places import results_folder
 from codesign_bench.storage.status import status_row
 from codesign_bench.storage.survey import lines, survey
 
@@ -25,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Print one line per cell, the counts, and the errors of failed cells."""
-    print_status(console, options.results)
+    print_status(console, results_folder(options.results))
     return 0
 
 

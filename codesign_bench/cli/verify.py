@@ -26,9 +26,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     """Check the claims, print the table and write it."""
     from codesign_bench.claims.verify import verify
+    from codesign_bench.storage.layout import refuse_archive
+    from codesign_bench.storage.places import results_folder
     from codesign_bench.storage.survey import lines, survey
 
-    left_out = lines(options.results, survey(options.results))
+    results = results_folder(options.results)
+    if options.measure:
+        refuse_archive(results)
+    left_out = lines(results, survey(results))
     tell_left_out(left_out)
-    verify(load_study(options.study), options.results, options.out, console, measure=options.measure, left_out=left_out)
+    verify(load_study(options.study), results, options.out, console, measure=options.measure, left_out=left_out)
     return 0

@@ -74,7 +74,7 @@ def _around(request: Request, inside: pd.DataFrame) -> Iterator[pd.DataFrame]:
     for task, method, label, variant, cutout in inside[keys].drop_duplicates().itertuples(index=False):
         varied = Variant.of(cutout=cutout or None)
         try:
-            table = load_or_measure(request.results, [(task, method)], request.log, request.named, varied)
+            table = load_or_measure(request.results, [(task, method)], request.log, request.may_measure, varied)
         except UserError as error:
             if request.named:  # otherwise not measured yet, and the region has no line
                 request.log(f"around the region, {task}/{method}/{variant} left out: {error}")

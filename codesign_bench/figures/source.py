@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
+from codesign_bench.storage.archive import is_archive
 from codesign_bench.storage.cells import reported_cells
 from codesign_bench.storage.frames import load_evaluations, stored_curves
 from codesign_bench.storage.reference_points import with_reference_points
@@ -29,7 +30,12 @@ class Request:
     log: Log = silent
     """Prints a line, e.g. on what is left out."""
     named: bool = False
-    """Whether the user named the figure; then missing data may be measured, which can take minutes."""
+    """Whether the user named the figure."""
+
+    @property
+    def may_measure(self) -> bool:
+        """Whether missing data may be measured, which can take minutes, and kept beside the cells."""
+        return self.named and not is_archive(self.results)
 
 
 Source: TypeAlias = "Callable[[Request], pd.DataFrame]"
@@ -59,7 +65,7 @@ def design_sensitivity(request: Request) -> pd.DataFrame:
     from codesign_bench.evaluation.sensitivity import load_sensitivity, measure_missing
     from codesign_bench.task import task_names
 
-    if request.named:
+    if request.may_measure:
         measure_missing(request.results, task_names(), request.log)
     return load_sensitivity(request.results)
 

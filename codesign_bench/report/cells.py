@@ -12,6 +12,7 @@ from codesign_bench.console import duration
 from codesign_bench.errors import UserError
 from codesign_bench.registry import in_order
 from codesign_bench.storage.cells import scan
+from codesign_bench.storage.places import shown
 from codesign_bench.storage.records import CellRecord, Timings
 from codesign_bench.storage.status import status_row
 from codesign_bench.storage.survey import lines, survey
@@ -118,7 +119,7 @@ def facts(results: Path, cells: Sequence[PageCell]) -> list[tuple[str, str]]:
     """Return facts about the folder as names and values."""
     seeds = sorted({cell.record.seed for cell in cells})
     return [
-        ("results", str(results)),
+        ("results", shown(results)),
         ("cells", f"{len(cells)}: {counts(cells)}"),
         ("tasks", ", ".join(in_order("tasks", (cell.task for cell in cells)))),
         ("methods", ", ".join(in_order("methods", (cell.method for cell in cells)))),

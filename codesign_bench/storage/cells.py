@@ -18,6 +18,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.storage.files import reason_of
 from codesign_bench.storage.layout import CURVE_COLUMNS, CURVE_FILE, EVALUATION_FILE, METRICS_FILE, POLICY_FILE
 from codesign_bench.storage.locks import is_locked
+from codesign_bench.storage.places import cell_folder
 from codesign_bench.storage.reading import DamagedFile, UnreadableFile, UnusableFile, is_folder, is_there, read_bytes
 from codesign_bench.storage.records import CELL_FILE, DONE, INTERRUPTED, RUNNING, CellRecord
 from codesign_bench.storage.tables import TABLE_BYTES, Content, Form, checksum, read_table
@@ -169,12 +170,12 @@ def table_checksums(folder: Path) -> dict[str, str]:
 
 
 def open_cell(folder: str | Path) -> StoredCell:
-    """Return the cell in `folder`.
+    """Return the cell in `folder`, which may be in an archive or in the shipped results; see `places`.
 
     Raises:
         UserError: it is not a cell folder, or its record is damaged.
     """
-    folder = Path(folder)
+    folder = cell_folder(folder)
     record = CellRecord.read(folder)
     if record is None:
         raise UserError(f"'{folder}' is not a cell folder (no {CELL_FILE})")

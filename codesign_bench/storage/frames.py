@@ -13,6 +13,7 @@ from codesign_bench.config.values import plain_type
 from codesign_bench.errors import UserError
 from codesign_bench.stats.normalization import normalized_score
 from codesign_bench.storage.cells import StoredCell, reported_cells
+from codesign_bench.storage.places import results_folder
 from codesign_bench.storage.reading import UnusableFile
 from codesign_bench.storage.reference_points import stored_references
 from codesign_bench.storage.survey import survey
@@ -34,7 +35,8 @@ class LeftOutWarning(UserWarning):
 def load_results(out: str | Path) -> pd.DataFrame:
     """Return every evaluation of every cell below `out`, including running and failed cells, as one tidy frame.
 
-    Cells of tuning, which are evaluated on validation instances, are left out.
+    `out` is a folder, an archive that `codesign-bench pack` wrote, or `reference`, the shipped results. Cells of
+    tuning, which are evaluated on validation instances, are left out.
 
     Columns: task, method, variant, one for each axis (cutout, alpha, finetune, scratch, and any other axis of a cell;
     NaN where it is not varied), seed, label, those of `curve.csv`, then normalized_score: `return_mean` on the scale of
@@ -46,9 +48,10 @@ def load_results(out: str | Path) -> pd.DataFrame:
     Raises:
         UserError: the folder does not exist or contains no results.
     """
-    for problem in survey(Path(out)):
+    folder = results_folder(out)
+    for problem in survey(folder):
         warnings.warn(on_one_line(f"left out: {problem}"), LeftOutWarning, stacklevel=2)
-    return stored_curves(out)
+    return stored_curves(folder)
 
 
 def stored_curves(out: str | Path) -> pd.DataFrame:

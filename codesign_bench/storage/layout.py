@@ -1,6 +1,7 @@
 """The layout of a results folder: names of files, the marker file, and what a killed process leaves behind.
 
 OUT/codesign-bench.json                                  marks a results folder
+OUT/archive.json                                         marks an unpacked archive, which is only read
 OUT/<task>/<method>/<variant>/seed-00/cell.json          status, configuration with sources, versions, host, timings
                                      /curve.csv          one row per evaluation
                                      /metrics.csv        the method's metrics, averaged between evaluations
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -25,6 +27,8 @@ from codesign_bench.storage.locks import HOLDER_FILE, LOCK_FILE, locked
 from codesign_bench.storage.records import CELL_FILE
 
 MARKER_FILE = "codesign-bench.json"
+ARCHIVE_FILE = "archive.json"
+"""The manifest of an archive; a folder that has it is only read."""
 LAYOUT_SCHEMA = 1
 """Version of the folder layout; cell files have their own version."""
 CURVE_FILE = "curve.csv"
@@ -47,14 +51,25 @@ def open_folder(out: Path) -> None:
     """Make `out` a results folder, or check that it is one; several processes may do so at the same time.
 
     Raises:
-        UserError: it is not writable, or contains other files.
+        UserError: it is not writable, is an archive, or contains other files.
     """
+    refuse_archive(out)
     try:
         out.mkdir(parents=True, exist_ok=True)
         refuse_other_files(out)
         _mark(out)
     except OSError as error:
         raise UserError(f"--out {out}: not writable ({error.strerror})") from error
+
+
+def refuse_archive(out: Path) -> None:
+    """Check that results may be written into a folder.
+
+    Raises:
+        UserError: it is an unpacked archive, whose checksums hold only as long as nothing is added.
+    """
+    if os.path.exists(out / ARCHIVE_FILE):
+        raise UserError(f"'{out.name}' is an archive of results, which is only read; give a results folder of your own")
 
 
 def refuse_other_files(out: Path) -> None:

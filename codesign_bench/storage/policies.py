@@ -33,6 +33,8 @@ def save_policy(folder: Path, policy: Policy, header: dict[str, Any]) -> None:
 def load_policy(folder: str | Path) -> Policy:
     """Return the final policy of the cell in `folder`; `design(observation)` and `act(observation)` return its means.
 
+    The cell may be in an archive or in the shipped results: `mine.zip/push/...`, `reference/push/...`.
+
     Raises:
         ChangedTaskError: its task has changed since.
         UserError: the folder has no finished cell, or its files are damaged or incompatible with this version.

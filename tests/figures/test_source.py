@@ -21,6 +21,7 @@ from codesign_bench.figures.source import (
     timing,
     trials_on_an_arm,
 )
+from codesign_bench.storage.layout import ARCHIVE_FILE
 from codesign_bench.storage.measurements import DEPLOYMENT, DESIGN_SENSITIVITY, REFERENCE_POINTS
 from codesign_bench.storage.records import RUNNING
 from codesign_bench.storage.reference_points import FILE, reference_points_in
@@ -31,6 +32,15 @@ def test_curves_are_those_of_all_cells_and_evaluations_those_of_finished_ones(tm
     store_cell(tmp_path, seed=1, status=RUNNING, curve=rising(0.0, 5.0), evaluation=[{"return": 9.0}])
     assert curves(Request(tmp_path))["return_mean"].tolist() == [0.0, 1.0, 0.0, 5.0]
     assert evaluations(Request(tmp_path))["return"].tolist() == [1.0, 3.0]
+
+
+def test_an_archive_is_never_measured_whatever_was_named(tmp_path: Path) -> None:
+    assert Request(tmp_path, named=True).may_measure
+    assert not Request(tmp_path).may_measure
+    (tmp_path / ARCHIVE_FILE).write_text("{}")
+    assert not Request(tmp_path, named=True).may_measure
+    with pytest.raises(UserError, match="not measured yet"):
+        design_sensitivity(Request(tmp_path, named=True))
 
 
 def test_curves_come_with_the_reference_points_that_the_folder_has(tmp_path: Path) -> None:

@@ -1,0 +1,1 @@
+"""Results that people share: packing them into archives, comparing them, and the leaderboard made of them."""

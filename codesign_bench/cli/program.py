@@ -39,6 +39,7 @@ COMMANDS = (
     "plot",
     "verify",
     "report",
+    "explore",
     "reproduce",
     "reference",
     "headroom",

@@ -27,7 +27,7 @@ MEMBERS = {"methods": "methods", "tasks": "tasks", "paper_figs": "paper_figs", "
 
 EVERY_METHOD = "tests/methods/test_contract.py and tests/methods/test_honesty.py ask every method"
 PRINTED = "numbers that the paper prints"
-DATA = (".j2", ".css")
+DATA = (".j2", ".css", ".js")
 """Endings of files that are installed beside the code."""
 
 TESTED_ELSEWHERE = {

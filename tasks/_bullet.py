@@ -150,7 +150,7 @@ class BulletSimulator(DeployedSimulator):
         self.tools: list[int | None] = [None] * num_slots
         """The bodies that hold the tools and include them as links."""
         self.outlines: list[dict[int, tuple[Shape, ...]]] = [{} for _ in range(num_slots)]
-        """The shapes of every world's visible bodies except the tool, for `sketch`: PyBullet does not return them all."""
+        """Shapes of every world's visible bodies except the tool, for `sketch`; PyBullet does not return them all."""
         self.bodies: Floats = np.zeros((num_slots, num_bodies, SPIN.stop))
         """(B, N, 13): `PLACE`, `ROTATION`, `VELOCITY` and `SPIN` of the moving bodies."""
         self.pose: Floats = np.zeros((num_slots, 3 + len(self.turning_axes)))
@@ -385,9 +385,7 @@ class BulletSimulator(DeployedSimulator):
         """Return the bodies and marks of `render` as data; of an arm, only the tool."""
         camera, (height, width), marks = self.camera, PICTURE_SHAPE, MarkList()
         self.mark(slot, marks)
-        view = Viewpoint(
-            camera.eye, camera.target, camera.up, camera.field_of_view, camera.near, aspect=width / height
-        )
+        view = Viewpoint(camera.eye, camera.target, camera.up, camera.field_of_view, camera.near, aspect=width / height)
         bodies = tuple(self._item(slot, body) for body in self.outlines[slot])
         return Sketch(view, (*bodies, *marks.items), self._tool_pose(slot), COLOURS["tool"])
 

@@ -15,11 +15,20 @@ from typing import Any
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 PROGRAM = next((path for name in PROGRAMS if (path := shutil.which(name))), None)
 """The installed browser, if there is one."""
-FLAGS = (
-    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync --disable-dev-shm-usage --hide-scrollbars --force-color-profile=srgb "
-    "--remote-debugging-pipe"
-).split()
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-dev-shm-usage",
+    "--hide-scrollbars",
+    "--force-color-profile=srgb",
+    "--remote-debugging-pipe",
+]
 
 
 class Tab:
@@ -67,10 +76,12 @@ class Tab:
         self.send("Page.navigate", url=path.resolve().as_uri())
         while self.messages[-1].get("method") != "Page.loadEventFired":
             self.messages.append(self._receive())
-        ready = "document.documentElement.dataset.ready === 'yes'"
-        self.run(
-            f"new Promise((done) => {{ const look = () => {ready} ? done(true) : requestAnimationFrame(look); look(); }})"
-        )
+        self.until("document.documentElement.dataset.ready === 'yes'")
+
+    def until(self, condition: str) -> None:
+        """Wait until a condition on the page holds."""
+        look = f"const look = () => {condition} ? done(true) : requestAnimationFrame(look)"
+        self.run(f"new Promise((done) => {{ {look}; look(); }})")
 
     def run(self, script: str) -> Any:
         """Return the value of a script, or of the promise that it returns."""

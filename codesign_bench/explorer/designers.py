@@ -115,9 +115,7 @@ def designer_of(policy: Policy, goals: Goals, observations: GoalFunction, probes
     if error <= SAME:
         return OneDesign(designs[0], error)
     count = PLACES.get(len(goals.smooth), PLACES_OF_MANY)
-    places = [
-        np.array(axis.values) if axis.values else np.linspace(axis.low, axis.high, count) for axis in goals.axes
-    ]
+    places = [np.array(axis.values) if axis.values else np.linspace(axis.low, axis.high, count) for axis in goals.axes]
     grid = DesignGrid(places, played(policy, first_look(goals, product_of(places))), 0.0)
     return DesignGrid(places, grid.designs, _difference(grid(probes), designs))
 

@@ -1,4 +1,4 @@
-"""What depends on the goal, as polynomials that a page can evaluate: observations before the design, scenes at the start.
+"""What depends on the goal, as polynomials that a page can evaluate: first observations and scenes at the start.
 
 A task computes these in Python. Along axes with a list of values there is one polynomial per combination; along the
 others, Chebyshev polynomials through Chebyshev nodes. They are exact for constants and linear functions and converge

@@ -27,7 +27,7 @@ from .designers import Designer, NetworkDesigner, OneDesign, designer_of, first_
 from .functions import GoalFunction, fit
 from .goals import Goals
 from .packing import pack_frames, pack_program, pack_singles
-from .rollouts import Structures, draws, poses, record, stride_of, view_of
+from .rollouts import Structures, draws, record, stride_of, view_of
 from .tools import ToolModel, tool_model, tool_values
 
 GOALS = 64

@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import gzip
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -62,9 +63,7 @@ def unit_of(frames: Sequence[Sequence[Sequence[float]]]) -> float:
     return next((unit for unit in UNITS if largest <= LARGEST * unit), UNITS[-1])
 
 
-def pack_frames(
-    frames: Sequence[Sequence[Sequence[float]]], structures: Sequence[Sequence[int]]
-) -> dict[str, Any]:
+def pack_frames(frames: Sequence[Sequence[Sequence[float]]], structures: Sequence[Sequence[int]]) -> dict[str, Any]:
     """Return the poses of episodes, T frames of N numbers each, as JSON values.
 
     Poses are whole multiples of a unit. Per episode and run of frames of the same structure, every number's first value
@@ -88,4 +87,4 @@ def pack_frames(
 def runs(numbers: Sequence[int]) -> list[tuple[int, int]]:
     """Return start and end of every run of equal numbers."""
     starts = [0, *(place for place in range(1, len(numbers)) if numbers[place] != numbers[place - 1]), len(numbers)]
-    return [(start, end) for start, end in zip(starts, starts[1:], strict=False) if end > start]
+    return [(start, end) for start, end in pairwise(starts) if end > start]

@@ -9,7 +9,7 @@ one list of positions. What remains has few kinds, each on flat arrays:
 | ("constant", k) | constant k |
 | ("take", a, positions) | a[positions] |
 | ("join", a, ...) | the arrays one behind the other |
-| ("product", a, b, batch, rows, inner, columns) | matrix products of a (batch, rows, inner), b (batch, inner, columns) |
+| ("product", a, b, batch, m, k, n) | products of matrices, a (batch, m, k) and b (batch, k, n) |
 | ("add" or "subtract" or "multiply" or "divide", a, b) | elementwise |
 | ("relu" or "sigmoid" or "tanh" or "exp", a) | elementwise |
 | ("clamp", a, low, high) | elementwise |
@@ -36,8 +36,12 @@ Act = Callable[[Tensor], Tensor]
 """Maps observations (B, O) to designs (B, D)."""
 
 MOVES = frozenset(
-    "alias cat clone contiguous detach expand flip index index_select narrow permute reshape select slice squeeze stack "
-    "t transpose unsqueeze view _to_copy _unsafe_view unbind split".split()
+    {
+        *("alias", "cat", "clone", "contiguous", "detach", "expand"),
+        *("flip", "index", "index_select", "narrow", "permute", "reshape"),
+        *("select", "slice", "squeeze", "stack", "t", "transpose"),
+        *("unsqueeze", "view", "_to_copy", "_unsafe_view", "unbind", "split"),
+    }
 )
 """Operations of torch whose every number is one of the operands' numbers."""
 PAIRS = {"add": "add", "sub": "subtract", "mul": "multiply", "div": "divide"}

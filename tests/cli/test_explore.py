@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from explorer_pages import data_of
 
 from builders import VERSION_0_1_0
 from codesign_bench.cli import main
-from explorer_pages import data_of
 
 
 def test_a_page_has_the_chosen_cells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -32,7 +32,11 @@ def test_a_page_has_the_chosen_cells(tmp_path: Path, capsys: pytest.CaptureFixtu
     ],
 )
 def test_bad_input_is_named_in_a_line(
-    arguments: tuple[str, ...], named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    arguments: tuple[str, ...],
+    named: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["explore", "--results", str(VERSION_0_1_0), *arguments]) == 2

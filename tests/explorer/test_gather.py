@@ -30,7 +30,7 @@ def test_cells_that_cannot_be_shown_are_named(tmp_path: Path) -> None:
     store_cell(tmp_path, seed=0)
     store_cell(tmp_path, seed=1, variant=Variant.of(alpha=0.3))
     lines: list[str] = []
-    with pytest.raises(UserError, match="no cell of this choice .* has a policy"):
+    with pytest.raises(UserError, match=r"no cell of this choice .* has a policy"):
         chosen_cells(tmp_path, Choice(), lines.append)
     assert lines == [f"left out: 1 cell without a policy in '{tmp_path}'"]
     with pytest.raises(UserError, match="no finished cell of this choice"):

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from chromium import PROGRAM, Tab, chromium
+from explorer_pages import NODE, data_of, in_node, write_page
 
 from builders import VERSION_0_1_0
-from chromium import PROGRAM, Tab, chromium
 from codesign_bench.errors import UserError
 from codesign_bench.explorer import page as page_module
 from codesign_bench.explorer.designers import first_look, played
@@ -18,7 +19,6 @@ from codesign_bench.explorer.goals import Goals
 from codesign_bench.explorer.tools import tool_values
 from codesign_bench.storage.policies import load_policy
 from codesign_bench.task import load_task
-from explorer_pages import NODE, data_of, in_node, write_page
 from reports import Reader
 
 AGREED = 1e-4
@@ -82,7 +82,9 @@ def box_of(tab: Tab, name: str) -> dict[str, float]:
     """Return where a part of panel A is."""
     script = f"page.panels[0].root.querySelector('[data-part={name}]')"
     tab.run(f"{script}.scrollIntoView({{block: 'center'}})")
-    found: dict[str, float] = tab.run(f"(({{x, y, width, height}}) => ({{x, y, width, height}}))({script}.getBoundingClientRect())")
+    found: dict[str, float] = tab.run(
+        f"(({{x, y, width, height}}) => ({{x, y, width, height}}))({script}.getBoundingClientRect())"
+    )
     return found
 
 
@@ -106,6 +108,16 @@ def test_dragging_the_goal_changes_the_tool_to_the_policys_own(page: Path, tab: 
 
 
 @needs_browser
+def test_the_goal_can_be_dragged_in_the_scene(tab: Tab) -> None:
+    box = box_of(tab, "scene")
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    tab.mouse("mousePressed", x, y)
+    tab.mouse("mouseReleased", x, y)
+    # The view of push shows x from 4 to 30 m and y from -1 to 17 m.
+    assert tab.run("page.state.point") == pytest.approx([17.0, 8.0], abs=0.1)
+
+
+@needs_browser
 def test_the_goal_moves_by_keys_and_both_panels_share_it(tab: Tab) -> None:
     tab.run("page.panels[0].root.querySelector('[data-part=map]').focus()")
     before = tab.run("page.state.point")
@@ -114,7 +126,9 @@ def test_the_goal_moves_by_keys_and_both_panels_share_it(tab: Tab) -> None:
     after = tab.run("page.state.point")
     assert after[0] < before[0]
     assert after[1] < before[1]
-    labels = tab.run("page.panels.map((panel) => panel.root.querySelector('[data-part=map]').getAttribute('aria-label'))")
+    labels = tab.run(
+        "page.panels.map((panel) => panel.root.querySelector('[data-part=map]').getAttribute('aria-label'))"
+    )
     assert len({label.split("Goal: ")[1].split(". Nearest")[0] for label in labels}) == 1
 
 
@@ -124,7 +138,9 @@ def test_playing_runs_to_the_end_of_the_episode_and_changes_the_picture(tab: Tab
     before = tab.run(picture)
     tab.run("document.getElementById('play').click()")
     ended = "!page.state.playing && page.state.time > 0"
-    tab.run(f"new Promise((done) => {{ const look = () => {ended} ? done(true) : requestAnimationFrame(look); look(); }})")
+    tab.run(
+        f"new Promise((done) => {{ const look = () => {ended} ? done(true) : requestAnimationFrame(look); look(); }})"
+    )
     assert tab.run("page.state.time") == pytest.approx(float(tab.run("document.getElementById('time').max")))
     assert tab.run(picture) != before
     assert "Shown" in tab.run("page.panels[0].root.querySelector('[data-part=status]').textContent")
@@ -135,7 +151,8 @@ def test_playing_runs_to_the_end_of_the_episode_and_changes_the_picture(tab: Tab
 def test_the_page_fits_the_window_and_every_control_has_a_name(width: int, page: Path, tab: Tab) -> None:
     tab.open(page, width)
     assert tab.run("document.documentElement.scrollWidth") <= width
-    unnamed = "[...document.querySelectorAll('select, input, button, canvas')].filter((e) => !(e.labels && e.labels.length) && !e.getAttribute('aria-label') && !e.textContent.trim()).length"
+    unnamed = """[...document.querySelectorAll("select, input, button, canvas")].filter((control) =>
+        !control.labels?.length && !control.getAttribute("aria-label") && !control.textContent.trim()).length"""
     assert tab.run(unnamed) == 0
 
 

@@ -37,10 +37,15 @@ const draw = (() => {
 
   // --- flat scenes -------------------------------------------------------------------------------------------------
 
-  function flat(context, box, view, items) {
+  function fitted(box, view) {
     const scale = Math.min(box.width / (view.x[1] - view.x[0]), box.height / (view.y[1] - view.y[0]));
     const left = box.x + 0.5 * (box.width - scale * (view.x[1] - view.x[0]));
     const bottom = box.y + box.height - 0.5 * (box.height - scale * (view.y[1] - view.y[0]));
+    return { scale, left, bottom };
+  }
+
+  function flat(context, box, view, items) {
+    const { scale, left, bottom } = fitted(box, view);
     context.save();
     context.beginPath();
     context.rect(box.x, box.y, box.width, box.height);
@@ -211,6 +216,7 @@ const draw = (() => {
       const at = (point) => add(place, times(turn, point));
       for (const shape of shapes) {
         if (shape.kind === "box") box3(raster, shape, turn, at);
+        else if (shape.kind === "patch") raster.polygon(shape.points.map(at), shaded(shape.colour, [0, 0, 1]));
         else if (shape.kind === "ball") raster.ball(at(shape.points), shape.size[0], shape.colour);
         else marks.push({ ...shape, at });
       }
@@ -253,14 +259,43 @@ const draw = (() => {
     else flat(context, box, view, items);
   }
 
-  // The tool alone, seen from its flattest side, in a box around `centre`.
+  // Where a pixel of a scene is: in its plane, or at a height in space.
+  function placeAt(box, view, [column, row], height) {
+    if (!view.eye) {
+      const { scale, left, bottom } = fitted(box, view);
+      return [view.x[0] + (column - left) / scale, view.y[0] + (bottom - row) / scale];
+    }
+    const width = Math.min(box.width, box.height * view.aspect);
+    const [across, down] = [column - box.x - 0.5 * box.width, row - box.y - 0.5 * box.height];
+    const raster = new Raster(1, 1, view);
+    const focus = (0.5 * width) / view.aspect / Math.tan((0.5 * view.field * Math.PI) / 180);
+    const ray = [0, 1, 2].map((i) => (across * raster.right[i] - down * raster.upward[i]) / focus - raster.back[i]);
+    const share = (height - view.eye[2]) / ray[2];
+    return [view.eye[0] + share * ray[0], view.eye[1] + share * ray[1]];
+  }
+
+  // A rectangle on the ground, as an item.
+  function field(view, [left, right], [front, back], height, colour) {
+    const ground = [[left, front], [right, front], [right, back], [left, back]];
+    const shape = view.eye
+      ? { kind: "patch", colour, points: ground.map((point) => [...point, height]) }
+      : { kind: "polygon", colour, points: ground.flat() };
+    return { pose: [], shapes: [shape] };
+  }
+
+  // The tool alone, its middle at `centre`.
   function tool(context, kind, values, centre, extent, scale, colour) {
     const [u, v] = extent.plane;
-    const place = (point) => [centre[0] + scale * (point[u] - extent.middle[u]), centre[1] - scale * (point[v] - extent.middle[v])];
+    const corner = (shape) => corners.map((signs) => add(shape.points, times(shape.matrix, signs.map((s, i) => s * shape.size[i]))));
+    const shapes = toolItem(kind, values, [], colour).shapes;
+    const all = shapes.flatMap((shape) =>
+      kind === "planar" ? [[...shape.points.slice(0, 2), 0], [...shape.points.slice(2), 0]] : corner(shape));
+    const middle = [0, 1, 2].map((i) => 0.5 * (Math.min(...all.map((p) => p[i])) + Math.max(...all.map((p) => p[i]))));
+    const place = (point) => [centre[0] + scale * (point[u] - middle[u]), centre[1] - scale * (point[v] - middle[v])];
     context.save();
     context.lineCap = context.lineJoin = "round";
     context.fillStyle = context.strokeStyle = colour;
-    for (const shape of toolItem(kind, values, [], colour).shapes) {
+    for (const shape of shapes) {
       context.beginPath();
       if (kind === "planar") {
         context.moveTo(...place([shape.points[0], shape.points[1], 0]));
@@ -269,15 +304,18 @@ const draw = (() => {
         context.stroke();
         continue;
       }
-      const points = corners.map((corner) => add(shape.points, times(shape.matrix, corner.map((s, i) => s * shape.size[i]))));
+      const points = corner(shape);
       for (const [order] of faces) {
+        context.beginPath();
         order.forEach((index) => context.lineTo(...place(points[index])));
         context.closePath();
+        context.fill();
+        context.lineWidth = 1;
+        context.stroke();
       }
-      context.fill();
     }
     context.restore();
   }
 
-  return { itemsOfFrame, itemsOfStart, toolItem, scene, tool };
+  return { itemsOfFrame, itemsOfStart, toolItem, scene, placeAt, field, tool };
 })();

@@ -6,7 +6,6 @@ const page = (() => {
   const state = { task: null, point: [], time: 0, playing: false, started: 0 };
   const panels = ["a", "b"].map((name) => ({ name, cell: null, root: get(`panel-${name}`) }));
   const loaded = { tasks: new Map(), cells: new Map() };
-  const still = matchMedia("(prefers-reduced-motion: reduce)");
 
   function make(tag, attributes = {}, text = "") {
     const element = document.createElement(tag);
@@ -35,6 +34,9 @@ const page = (() => {
     state.time = 0;
     pause();
     task.extent = null;
+    task.handle = handleOf(task);
+    for (const panel of panels) part(panel, "scene").classList.toggle("draggable", task.handle !== null);
+    get("outside").hidden = !task.mask;
     state.point = [...task.points[Math.floor(task.points.length / 2)]];
     get("axes").replaceChildren(...task.axes.map(slider));
     const methods = [...new Set(task.cells.map((cell) => cell.method))];
@@ -48,6 +50,40 @@ const page = (() => {
     get("solved-when").textContent = task.success.length ? `Solved: ${task.success.join("; ")}.` : "";
     await Promise.all(panels.map(chooseCell));
   }
+
+  // The item of the scene that is where the goal is, if there is one: then the goal can be dragged in the scene itself.
+  function handleOf(task) {
+    const [across, up] = task.axes;
+    if (!task.startScene || !up || across.values.length || up.values.length) return null;
+    const shown = [0.3, 0.8].map((at) => {
+      const point = task.points[0].map((value, i) => (i > 1 ? value : task.axes[i].low + at * (task.axes[i].high - task.axes[i].low)));
+      return { point, items: draw.itemsOfStart(task.start, task.startScene(point)) };
+    });
+    const near = 1e-3 * (across.high - across.low);
+    const index = shown[0].items.findIndex((_, i) =>
+      shown.every(({ point, items }) => items[i].pose.length && [0, 1].every((k) => Math.abs(items[i].pose[k] - point[k]) < near)));
+    if (index < 0) return null;
+    const { pose, shapes } = shown[0].items[index];
+    const height = task.view.eye ? pose[2] : 0;
+    return { height, ground: height - (shapes[0].kind === "box" ? shapes[0].size[2] : 0) + 1e-3 };
+  }
+
+  // The recorded goals as fields on the ground of the scene, with the colours of the map.
+  function fields(panel) {
+    const { task, point } = state;
+    const [width, depth] = [0, 1].map((i) => (task.axes[i].high - task.axes[i].low) / task.places[i].length);
+    return task.points.flatMap((other, index) => {
+      if (hidden(other, point)) return [];
+      const colour = style(panel.cell.success[index] ? "--solved" : "--missed");
+      const around = (value, size) => [value - 0.47 * size, value + 0.47 * size];
+      return [draw.field(task.view, around(other[0], width), around(other[1], depth), task.handle.ground, colour)];
+    });
+  }
+
+  // Whether a recorded goal is on another map than the shown one: other values of the third axis or a later one.
+  const hidden = (other, point) =>
+    state.task.axes.some((_, i) => i > 1 &&
+      core.nearestIndex(state.task.places[i], other[i]) !== core.nearestIndex(state.task.places[i], point[i]));
 
   function slider(axis, index) {
     const row = make("label", { class: "axis" });
@@ -109,7 +145,6 @@ const page = (() => {
     const solved = cell.success.reduce((sum, value) => sum + value, 0);
     part(panel, "about").textContent =
       `${kinds[cell.designer.kind]} Solved ${solved} of ${cell.success.length} recorded goals after ${cell.steps.toLocaleString("en")} steps of training.`;
-    panel.values = null;
     show();
   }
 
@@ -144,7 +179,6 @@ const page = (() => {
     if (!state.playing) return;
     state.time = Math.min(duration(), state.time + Math.max(0, now - state.moment) / 1000);
     state.moment = now;
-    state.rolling = true;
     if (state.time >= duration()) pause();
     show();
     if (state.playing) requestAnimationFrame(tick);
@@ -223,7 +257,8 @@ const page = (() => {
     const { items, toolPose } = draw.itemsOfFrame(task.structures[frame.structure], frame.pose);
     const scene = live && task.startScene ? draw.itemsOfStart(task.start, task.startScene(point)) : items;
     const tool = values && toolPose.length ? [draw.toolItem(toolKind(panel.cell), values, toolPose, task.colour)] : [];
-    draw.scene(context, box, view, view.eye ? [...scene, ...tool] : [...scene, ...tool]);
+    panel.sceneBox = box;
+    draw.scene(context, box, view, [...(task.handle ? fields(panel) : []), ...scene, ...tool]);
     canvas.setAttribute("aria-label", `${task.title}, ${panel.cell.label}, seed ${panel.cell.seed}: ` +
       (live ? `the tool for ${place(point)}, at the start` : `the episode after ${state.time.toFixed(1)} s`));
   }
@@ -248,8 +283,7 @@ const page = (() => {
     const plane = [0, 1, 2].sort((one, two) => widths[two] - widths[one]).slice(0, 2).sort();
     return (task.extent = {
       plane,
-      middle: high.map((value, axis) => 0.5 * (value + low[axis])),
-      width: Math.max(widths[plane[0]], widths[plane[1]]),
+      width: Math.max(widths[plane[0]], widths[plane[1]]) / 2 + 0.5 * Math.min(widths[plane[0]], widths[plane[1]]),
     });
   }
 
@@ -273,7 +307,7 @@ const page = (() => {
     const [across, up] = task.axes;
     const drawn = canvasOf(panel, "map", up ? 1.25 : 4);
     const { canvas, context, density } = drawn;
-    const pad = { left: 46 * density, bottom: 34 * density, top: 8 * density, right: 8 * density };
+    const pad = { left: 58 * density, bottom: 34 * density, top: 8 * density, right: 8 * density };
     const area = {
       x: pad.left, y: pad.top, width: canvas.width - pad.left - pad.right, height: canvas.height - pad.top - pad.bottom,
     };
@@ -285,8 +319,7 @@ const page = (() => {
     const [columns, rows] = [task.places[0].length, up ? task.places[1].length : 1];
     const [width, height] = [area.width / columns, area.height / rows];
     task.points.forEach((other, index) => {
-      const elsewhere = task.axes.some((axis, i) => i > 1 && core.nearestIndex(task.places[i], other[i]) !== core.nearestIndex(task.places[i], point[i]));
-      if (elsewhere) return;
+      if (hidden(other, point)) return;
       const [x, y] = at(other);
       const solved = panel.cell.success[index];
       context.fillStyle = style(solved ? "--solved" : "--missed");
@@ -382,7 +415,7 @@ const page = (() => {
         ...space.names.map((name) => {
           const row = make("tr");
           const bar = make("td", { class: "bar" });
-          bar.append(make("meter", { min: -1, max: 1, "aria-hidden": "true" }));
+          bar.append(make("div", { "aria-hidden": "true" }));
           row.append(make("th", { scope: "row" }, words(name)), make("td", { class: "number" }), bar);
           return row;
         }),
@@ -391,25 +424,47 @@ const page = (() => {
     values.forEach((value, i) => {
       const [, cell, bar] = body.children[i].children;
       cell.textContent = withUnit(value, space.units[i]);
-      bar.firstChild.value = design[i];
+      bar.firstChild.style.width = `${(50 * (design[i] + 1)).toFixed(1)}%`;
     });
   }
 
   // --- what a person does ------------------------------------------------------------------------------------------
 
-  function drag(panel, event) {
-    const canvas = part(panel, "map");
+  function pixel(canvas, event) {
     const bounds = canvas.getBoundingClientRect();
-    const { x, y, width, height } = panel.area;
-    const [left, top] = [
+    return [
       ((event.clientX - bounds.left) * canvas.width) / bounds.width,
       ((event.clientY - bounds.top) * canvas.height) / bounds.height,
     ];
+  }
+
+  function dragMap(panel, event) {
+    const [left, top] = pixel(part(panel, "map"), event);
+    const { x, y, width, height } = panel.area;
     const [across, up] = state.task.axes;
     const point = [...state.point];
     point[0] = valueAt(across, (left - x) / width);
     if (up) point[1] = valueAt(up, 1 - (top - y) / height);
     moveTo(point);
+  }
+
+  function dragScene(panel, event) {
+    const { view, handle, axes } = state.task;
+    if (!handle) return;
+    const place = draw.placeAt(panel.sceneBox, view, pixel(part(panel, "scene"), event), handle.height);
+    moveTo(state.point.map((value, i) => (i > 1 ? value : Math.min(axes[i].high, Math.max(axes[i].low, place[i])))));
+  }
+
+  function draggable(panel, canvas, drag) {
+    let dragging = false;
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      dragging = true;
+      if (canvas.tabIndex >= 0) canvas.focus({ preventScroll: true });
+      drag(panel, event);
+    });
+    canvas.addEventListener("pointermove", (event) => dragging && drag(panel, event));
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => (dragging = false));
   }
 
   function listen(panel) {
@@ -419,15 +474,8 @@ const page = (() => {
     });
     part(panel, "seed").addEventListener("change", () => chooseCell(panel));
     const map = part(panel, "map");
-    map.addEventListener("pointerdown", (event) => {
-      map.setPointerCapture(event.pointerId);
-      panel.dragging = true;
-      map.focus({ preventScroll: true });
-      drag(panel, event);
-      event.preventDefault();
-    });
-    map.addEventListener("pointermove", (event) => panel.dragging && drag(panel, event));
-    for (const end of ["pointerup", "pointercancel"]) map.addEventListener(end, () => (panel.dragging = false));
+    draggable(panel, map, dragMap);
+    draggable(panel, part(panel, "scene"), dragScene);
     map.addEventListener("keydown", (event) => {
       const [index, step] = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowDown: [1, -1], ArrowUp: [1, 1] }[event.key] || [];
       if (index === undefined || index >= state.task.axes.length) return;
@@ -458,5 +506,5 @@ const page = (() => {
   }
 
   begin();
-  return { data, state, panels, moveTo, still };
+  return { data, state, panels, moveTo };
 })();

@@ -24,6 +24,7 @@ from codesign_bench.task import (
     Frame,
     Given,
     Item,
+    Numbers,
     Physics,
     PlanarPart,
     Shape,
@@ -191,7 +192,8 @@ class PlanarSimulator(Simulator):
 
     def sketch(self, slot: int) -> Sketch:
         """Return the bodies and marks of `render` as data; the tool is the moving body of segments."""
-        marks, bodies, tool_pose = MarkList(), [], ()
+        marks, bodies = MarkList(), []
+        tool_pose: Numbers = ()
         self.mark(slot, marks)
         for kind in (pymunk.Body.STATIC, pymunk.Body.KINEMATIC, pymunk.Body.DYNAMIC):
             shapes: dict[pymunk.Body, list[pymunk.Shape]] = {}
@@ -200,7 +202,7 @@ class PlanarSimulator(Simulator):
                     shapes.setdefault(shape.body, []).append(shape)
             for body, own in shapes.items():
                 moves = kind != pymunk.Body.STATIC
-                pose = (*body.position, body.angle) if moves else ()
+                pose: Numbers = (*body.position, body.angle) if moves else ()
                 if moves and isinstance(own[0], pymunk.Segment):
                     tool_pose = pose
                 else:

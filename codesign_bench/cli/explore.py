@@ -11,7 +11,7 @@ from rich.console import Console
 from codesign_bench.cell.grid import parse_seeds
 from codesign_bench.cli.arguments import OfKind, add_out, add_results
 from codesign_bench.config.values import Within
-from codesign_bench.console import printer
+from codesign_bench.console import printer, tell_left_out
 
 HELP = "write one HTML page in which you drag goals and see the tools that methods design"
 DEFAULT_EXPLORER = Path("results/explorer.html")
@@ -35,8 +35,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.cli.arguments import chosen_methods, chosen_tasks
     from codesign_bench.explorer.gather import Choice
     from codesign_bench.explorer.page import write_explorer
+    from codesign_bench.storage.survey import lines, survey
 
     say = printer(console)
+    tell_left_out(lines(options.results, survey(options.results)))
     choice = Choice(
         tasks=tuple(chosen_tasks(options.task, say)) if options.task else (),
         methods=tuple(chosen_methods(options.method, say)) if options.method else (),

@@ -63,7 +63,7 @@ def fit(features: Features, goals: Goals) -> GoalFunction:
     count = NODES.get(len(smooth), NODES_OF_MANY)
     angles = np.pi * (np.arange(count) + 0.5) / count
     degrees = tuple(product(range(count), repeat=len(smooth)))
-    nodes = np.stack([grid.ravel() for grid in np.meshgrid(*[np.arange(count)] * len(smooth), indexing="ij")] or [[0]])
+    nodes = np.array(list(product(range(count), repeat=len(smooth))), dtype=int).reshape(-1, len(smooth)).T
     points = np.zeros((len(combinations), nodes.shape[1], len(goals.axes)))
     for place, axis in enumerate(smooth):
         low, high = goals.axes[axis].low, goals.axes[axis].high

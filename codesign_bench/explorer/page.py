@@ -40,26 +40,26 @@ def write_explorer(results: Path, out: Path, log: Log, choice: Choice | None = N
         raise UserError(f"--out {out}: the file must end in {ENDINGS[0]}")
     choice = choice or Choice()
     cells = chosen_cells(results, choice, log)
+    count = sum(map(len, cells.values()))
     with removed_if_refused(out.parent):
         make_folder(f"--out {out}", out.parent)
         tasks = []
         for name, of_task in cells.items():
             tasks.append(task_data(name, of_task, choice.goals, log))
-            check_size(tasks, sum(map(len, cells.values())))
+            check_size(sum(map(len, map(_json, tasks))), sum(len(task["cells"]) for task in tasks), count)
         page = render(tasks, results.name)
+        check_size(len(page.encode()), count, count)
         write_output(f"--out {out}", out, page)
-    log(f"{out}: {_megabytes(len(page))}, {sum(map(len, cells.values()))} cells")
+    log(f"{out}: {_megabytes(len(page))}, {count} cells")
 
 
-def check_size(tasks: list[dict[str, Any]], cells: int) -> None:
-    """Check that a page with `tasks`, of `cells` cells in the end, is no larger than allowed.
+def check_size(size: int, shown: int, cells: int) -> None:
+    """Check that a page of `size` bytes, which shows `shown` of `cells` cells so far, is no larger than allowed.
 
     Raises:
         UserError: it is larger; says which options make it smaller.
     """
-    size = sum(len(_json(task)) for task in tasks)
     if size > MOST_BYTES:
-        shown = sum(len(task["cells"]) for task in tasks)
         raise UserError(
             f"explore: the page would be larger than {_megabytes(MOST_BYTES)}: {_megabytes(size)} with {shown} of "
             f"{cells} cells; choose fewer with --task, --method or --seeds, or fewer goals with --goals"
@@ -72,9 +72,6 @@ def render(tasks: list[dict[str, Any]], results: str) -> str:
     Args:
         tasks: from `task_data`.
         results: name of the results.
-
-    Raises:
-        UserError: it is larger than allowed.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("codesign_bench.explorer"),
@@ -91,11 +88,7 @@ def render(tasks: list[dict[str, Any]], results: str) -> str:
         code=str(code_version()),
     )
     # The data are plain ASCII, and long: looking at each of their characters would take seconds.
-    result = visible(page).replace(PLACE_OF_DATA, _json({"results": visible(results), "tasks": tasks}))
-    if len(result.encode()) > MOST_BYTES:
-        check_size(tasks, 0)
-        raise UserError(f"explore: the page would be larger than {_megabytes(MOST_BYTES)}; choose fewer cells")
-    return result
+    return visible(page).replace(PLACE_OF_DATA, _json({"results": visible(results), "tasks": tasks}))
 
 
 def _json(values: Any) -> str:

@@ -295,15 +295,17 @@ const draw = (() => {
     context.save();
     context.lineCap = context.lineJoin = "round";
     context.fillStyle = context.strokeStyle = colour;
-    for (const shape of shapes) {
+    if (kind === "planar") {
+      // One path, so that links do not shine through each other.
       context.beginPath();
-      if (kind === "planar") {
-        context.moveTo(...place([shape.points[0], shape.points[1], 0]));
-        context.lineTo(...place([shape.points[2], shape.points[3], 0]));
-        context.lineWidth = Math.max(2, 2 * scale * shape.size[0]);
-        context.stroke();
-        continue;
+      for (const { points } of shapes) {
+        context.moveTo(...place([points[0], points[1], 0]));
+        context.lineTo(...place([points[2], points[3], 0]));
       }
+      context.lineWidth = Math.max(2, 2 * scale * shapes[0].size[0]);
+      context.stroke();
+    }
+    for (const shape of kind === "planar" ? [] : shapes) {
       const points = corner(shape);
       for (const [order] of faces) {
         context.beginPath();

@@ -345,7 +345,7 @@ const page = (() => {
     const [x, y] = at(point);
     if (values) {
       const extent = extentOf(panel);
-      const scale = (0.34 * Math.min(area.width, area.height)) / (extent.width || 1);
+      const scale = (0.28 * Math.min(area.width, area.height)) / (extent.width || 1);
       context.globalAlpha = 0.82;
       draw.tool(context, toolKind(panel.cell), values, [x, y], extent, scale, task.colour);
       context.globalAlpha = 1;

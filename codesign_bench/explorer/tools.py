@@ -79,9 +79,9 @@ def tool_model(task: Task) -> ToolModel | None:
     designs = rng.uniform(-1.0, 1.0, (3 * rows + CHECKS, size))
     values = tool_values(task, designs)[1]
     train, check = slice(0, -CHECKS), slice(-CHECKS, None)
-    weights: Floats = np.linalg.lstsq(features(angles, designs[train]), values[train], rcond=None)[0].T
+    weights = np.linalg.lstsq(features(angles, designs[train]), values[train], rcond=None)[0].T
     weights[np.abs(weights) < 1e-10] = 0.0
-    model = ToolModel(kind, angles, weights)
+    model = ToolModel(kind, angles, weights.astype(np.float64))
     return model if np.abs(model(designs[check]) - values[check]).max() < TOLERANCE else None
 
 

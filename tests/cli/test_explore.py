@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from explorer_pages import data_of
 
 from builders import VERSION_0_1_0
 from codesign_bench.cli import main
+from explorer_pages import data_of
 
 
 def test_a_page_has_the_chosen_cells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

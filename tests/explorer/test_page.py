@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from chromium import PROGRAM, Tab, chromium
-from explorer_pages import NODE, data_of, in_node, write_page
 
 from builders import VERSION_0_1_0
+from chromium import PROGRAM, Tab, chromium
 from codesign_bench.errors import UserError
 from codesign_bench.explorer import page as page_module
 from codesign_bench.explorer.designers import first_look, played
@@ -19,6 +18,7 @@ from codesign_bench.explorer.goals import Goals
 from codesign_bench.explorer.tools import tool_values
 from codesign_bench.storage.policies import load_policy
 from codesign_bench.task import load_task
+from explorer_pages import NODE, data_of, in_node, write_page
 from reports import Reader
 
 AGREED = 1e-4

@@ -64,6 +64,20 @@ def test_a_sketch_has_the_tool_and_a_pose_for_every_item(name: str) -> None:
     assert view_of(sketch)
 
 
+@pytest.mark.parametrize(("name", "body"), [("fetch_cube", -1), ("lift_cup", -1)])
+def test_a_body_in_space_is_where_the_simulator_has_it(name: str, body: int) -> None:
+    task = load_task(name)
+    episodes, slot = Episodes(task, 1), np.arange(1)
+    episodes.begin(slot, task.evaluation_instances()[:1])
+    episodes.design(slot, np.zeros((1, task.design_space.size)))
+    sketch = episodes.simulator.sketch(0)
+    bodies = [item for item in sketch.items if len(item.pose) == 7]
+    np.testing.assert_allclose(bodies[body].pose, episodes.simulator.bodies[0, 0, :7])  # type: ignore[attr-defined]
+    extents = [shape.size for item in bodies for shape in item.shapes]
+    assert np.min(extents) > 0.0
+    assert {shape.kind for item in sketch.items for shape in item.shapes} <= {"box", "line", "dot"}
+
+
 def test_a_task_without_sketches_is_recorded_without_frames() -> None:
     assert not draws(ToyReach())
     assert draws(PUSH)

@@ -63,7 +63,7 @@ def fit(features: Features, goals: Goals) -> GoalFunction:
     count = NODES.get(len(smooth), NODES_OF_MANY)
     angles = np.pi * (np.arange(count) + 0.5) / count
     degrees = tuple(product(range(count), repeat=len(smooth)))
-    nodes = np.array(list(product(range(count), repeat=len(smooth))), dtype=int).reshape(-1, len(smooth)).T
+    nodes = np.array(list(product(range(count), repeat=len(smooth))), dtype=int).reshape(count ** len(smooth), -1).T
     points = np.zeros((len(combinations), nodes.shape[1], len(goals.axes)))
     for place, axis in enumerate(smooth):
         low, high = goals.axes[axis].low, goals.axes[axis].high

@@ -144,9 +144,10 @@ class _Lowering:
     def __init__(self, graph: fx.GraphModule) -> None:
         self.graph = graph
         self.program = Program()
-        self.known: dict[int, int] = {}
-        """Identity of a constant tensor -> number of its operation."""
-        self.kept: list[Tensor] = []
+        self.known: dict[bytes, int] = {}
+        """Content of a constant -> number of its operation."""
+        self.sizes: dict[int, int] = {0: -1}
+        """Number of an operation -> how many numbers its value has; -1: not known."""
 
     def run(self) -> Program:
         """Return the program."""
@@ -155,7 +156,7 @@ class _Lowering:
             if node.op == "placeholder":
                 values[node.name] = _Value(tuple(node.meta["val"].shape), number=0)
             elif node.op == "get_attr":
-                tensor = operator.attrgetter(node.target)(self.graph).detach()
+                tensor = operator.attrgetter(node.target)(self.graph).detach().clone()  # may be changed in place
                 values[node.name] = _Value(tuple(tensor.shape), tensor=tensor)
             elif node.op == "output":
                 result = fx.map_arg(node.args[0], lambda other: values[other.name])
@@ -242,22 +243,21 @@ class _Lowering:
         places |= {key: value.tensor for key, value in indices.items()}  # type: ignore[misc]
         keywords = {key: value for key, value in keywords.items() if key != "dtype"}
         result = target(*_replaced(arguments, places), **_replaced(keywords, places))
-        whole = self._join(moved, inputs, starts)
+        whole = self._join(moved, inputs)
         if isinstance(result, (tuple, list)):
             return [_Value(tuple(part.shape), self._take(whole, part.numpy().ravel())) for part in result]
         return _Value(tuple(result.shape), self._take(whole, result.numpy().ravel()))
 
-    def _join(self, moved: list[_Value], inputs: list[_Value], starts: np.ndarray) -> int:
+    def _join(self, moved: list[_Value], inputs: list[_Value]) -> int:
+        """Return the number of the moved values, one behind the other."""
         if len(moved) == 1 and inputs[0] is moved[0]:
             return self._number(moved[0])
         if len(moved) != len(inputs):
             raise UnknownOperation("an index before what it is an index of")
-        del starts
         return self._append((), "join", *(self._number(value) for value in inputs)).number
 
     def _take(self, number: int, positions: np.ndarray, always: bool = False) -> int:
-        size = self._sizes.get(number)
-        if not always and size == len(positions) and (positions == np.arange(size)).all():
+        if not always and self.sizes[number] == len(positions) and (positions == np.arange(len(positions))).all():
             return number
         return self._append((len(positions),), "take", number, positions.tolist()).number
 
@@ -267,23 +267,18 @@ class _Lowering:
             return value.number
         assert value.tensor is not None
         flat = value.tensor.detach().reshape(-1).to(torch.float64).numpy()
-        key = hash((flat.tobytes(), flat.size))
+        key = flat.tobytes()
         if key not in self.known:
             self.program.constants.append(flat)
             self.known[key] = self._append(value.shape, "constant", len(self.program.constants) - 1).number
         return self.known[key]
-
-    @property
-    def _sizes(self) -> dict[int, int]:
-        return self.__dict__.setdefault("sizes", {})
 
     def _append(self, shape: tuple[int, ...], name: str, *operands: Any) -> _Value:
         if int(np.prod(shape)) > LONGEST:
             raise UnknownOperation("a value of too many numbers")
         self.program.operations.append((name, *operands))
         number = len(self.program.operations) - 1
-        if name != "join":
-            self._sizes[number] = int(np.prod(shape))
+        self.sizes[number] = -1 if name == "join" else int(np.prod(shape))
         return _Value(tuple(shape), number)
 
 

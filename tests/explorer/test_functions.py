@@ -11,7 +11,7 @@ from codesign_bench.explorer.goals import Goals
 from codesign_bench.task import Floats, load_task
 
 
-@pytest.mark.parametrize("name", ["push", "catch_balls"])
+@pytest.mark.parametrize("name", ["push", "catch_balls", "scoop"])
 def test_observations_before_the_design_are_met_to_single_precision(name: str) -> None:
     goals = Goals.of(load_task(name))
     function = fit(lambda points: first_look(goals, points).astype(np.float64), goals)

@@ -159,7 +159,7 @@ class _Lowering:
                 tensor = operator.attrgetter(node.target)(self.graph).detach().clone()  # may be changed in place
                 values[node.name] = _Value(tuple(tensor.shape), tensor=tensor)
             elif node.op == "output":
-                result = fx.map_arg(node.args[0], lambda other: values[other.name])
+                result: Any = fx.map_arg(node.args[0], lambda other: values[other.name])
                 result = result[0] if isinstance(result, (tuple, list)) else result
                 self._take(self._number(result), np.arange(int(np.prod(result.shape))), always=True)
             else:
@@ -167,8 +167,8 @@ class _Lowering:
         return self.program
 
     def _call(self, node: fx.Node, values: dict[str, Any]) -> Any:
-        arguments = fx.map_arg(node.args, lambda other: values[other.name])
-        keywords = fx.map_arg(node.kwargs, lambda other: values[other.name])
+        arguments: Any = fx.map_arg(node.args, lambda other: values[other.name])
+        keywords: Any = fx.map_arg(node.kwargs, lambda other: values[other.name])
         inputs = [value for value in _flat((arguments, keywords)) if isinstance(value, _Value)]
         if node.target is operator.getitem:
             return arguments[0][arguments[1]]

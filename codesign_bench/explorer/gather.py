@@ -71,7 +71,8 @@ def chosen_cells(results: Path, choice: Choice, log: Log) -> dict[str, list[Stor
     without = [cell for cell in done if not cell.has_policy]
     if without:
         log(f"left out: {_counted(len(without))} without a policy in '{results}'")
-    usable, reasons = [], {}
+    usable: list[StoredCell] = []
+    reasons: dict[str, list[StoredCell]] = {}
     for cell in done:
         if cell.has_policy:
             try:

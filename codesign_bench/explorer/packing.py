@@ -15,8 +15,8 @@ import numpy as np
 
 from .programs import LONG, Program, rounded
 
-LARGEST = 32_000
-"""Largest pose in its unit, so that it fits in 16 bits."""
+LARGEST = 8_000
+"""Largest pose in its unit: finer than a screen shows, and changes of it fit in 16 bits."""
 UNITS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5, 1.0, 10.0, 100.0, 1e3, 1e6)
 """Units of poses, m and rad; the smallest that fits is used."""
 
@@ -58,7 +58,7 @@ def pack_program(program: Program, bits: int) -> dict[str, Any]:
 
 
 def unit_of(frames: Sequence[Sequence[Sequence[float]]]) -> float:
-    """Return the unit in which all poses fit in 16 bits."""
+    """Return the smallest unit in which no pose is above `LARGEST`."""
     largest = max((abs(value) for rows in frames for row in rows for value in row), default=0.0)
     return next((unit for unit in UNITS if largest <= LARGEST * unit), UNITS[-1])
 

@@ -28,15 +28,15 @@ def test_planes_hold_low_bytes_first_and_negative_numbers() -> None:
 
 def test_frames_are_changes_of_whole_units() -> None:
     packed = pack_frames([[[0.1, -3.0], [0.2, -3.0]], [[0.0, 1.0]]], [[0, 0], [1]])
-    assert packed["unit"] == pytest.approx(1e-4)
+    assert packed["unit"] == pytest.approx(5e-4)
     assert packed["structures"] == [[[0, 2]], [[1, 1]]]
     low, high = np.frombuffer(unpacked(packed["content"]), np.uint8).reshape(2, -1).astype(int)
     values = (low + 256 * high + 2**15) % 2**16 - 2**15
-    assert values.tolist() == [1000, 1000, -30000, 0, 0, 10000]
+    assert values.tolist() == [200, 200, -6000, 0, 0, 2000]
 
 
 def test_the_unit_grows_with_the_scene_and_runs_are_found() -> None:
-    assert unit_of([[[40.0]]]) == pytest.approx(2e-3)
+    assert unit_of([[[40.0]]]) == pytest.approx(5e-3)
     assert unit_of([]) == pytest.approx(1e-4)
     assert runs([3, 3, 4, 3]) == [(0, 2), (2, 3), (3, 4)]
     assert runs([]) == []

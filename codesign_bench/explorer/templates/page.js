@@ -15,10 +15,12 @@ const page = (() => {
   }
 
   const part = (panel, name) => panel.root.querySelector(`[data-part="${name}"]`);
-  const number = (value) => (Math.abs(value) >= 100 ? value.toFixed(0) : value.toPrecision(3).replace("-", "−"));
+  const number = (value) =>
+    (Number.isInteger(value) || Math.abs(value) >= 100 ? value.toFixed(0) : value.toPrecision(3)).replace("-", "−");
   const words = (name) => name.replaceAll("_", " ");
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const withUnit = (value, unit) => `${number(value)}${unit && unit !== "1" ? ` ${unit}` : ""}`;
+  // A unit such as "0.18 m" is a multiple of one.
+  const withUnit = (value, unit) => number(value) + (unit && unit !== "1" ? (/^[0-9]/.test(unit) ? ` × ${unit}` : ` ${unit}`) : "");
 
   function place(point) {
     return state.task.axes
@@ -29,8 +31,11 @@ const page = (() => {
   // --- tasks and cells ---------------------------------------------------------------------------------------------
 
   async function chooseTask(index) {
+    state.wanted = index;
     if (!loaded.tasks.has(index)) loaded.tasks.set(index, await core.loadTask(data.tasks[index]));
+    if (state.wanted !== index) return;
     const task = (state.task = loaded.tasks.get(index));
+    for (const panel of panels) panel.cell = null; // until both are of this task, nothing is drawn
     state.time = 0;
     pause();
     task.extent = null;

@@ -25,8 +25,8 @@ from .functions import GoalFunction
 from .goals import Goals, product_of
 from .programs import Program, UnknownOperation, program_of
 
-ACCURACY = 3e-5
-"""Largest difference of a normalised design from the policy's: less than a third of what the page promises."""
+ACCURACY = 2e-5
+"""Largest difference of a normalised design from the policy's: a fifth of what the page promises."""
 BITS = (14, 15, 16, 17, 18, 19, 20, 22, 24)
 """Of a weight; the fewest that are accurate enough are used."""
 SAME = 1e-6

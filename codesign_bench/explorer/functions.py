@@ -43,8 +43,20 @@ class GoalFunction:
     """(T, smooth axes) degrees of the Chebyshev polynomials whose product is a term."""
     coefficients: Floats
     """(L, T, F)."""
-    error: float
-    """Largest error at goals between the nodes, relative to the size of the feature or to 1."""
+    errors: Floats
+    """(F,) largest error of each feature at goals between the nodes, relative to the feature's size or to 1."""
+
+    @property
+    def error(self) -> float:
+        """The largest of the features' errors."""
+        return float(self.errors.max(initial=0.0))
+
+    def part(self, features: list[int]) -> GoalFunction:
+        """Return the function with only some of its features, and the terms that these need."""
+        coefficients = self.coefficients[:, :, features]
+        kept = [term for term in range(len(self.exponents)) if coefficients[:, term].any()] or [0]
+        exponents = tuple(self.exponents[term] for term in kept)
+        return GoalFunction(self.goals, exponents, coefficients[:, kept], self.errors[features])
 
     def __call__(self, points: Floats) -> Floats:
         """Return the features (P, F) at `points` (P, X)."""
@@ -81,10 +93,10 @@ def fit(features: Features, goals: Goals) -> GoalFunction:
     kept = np.flatnonzero(np.abs(coefficients).max(axis=(0, 2)) > 0.0)
     kept = kept if kept.size else np.array([0])
     single = coefficients[:, kept].astype(np.float32).astype(np.float64)  # as a page gets them
-    found = GoalFunction(goals, tuple(degrees[term] for term in kept), single, 0.0)
+    found = GoalFunction(goals, tuple(degrees[term] for term in kept), single, np.zeros(single.shape[2]))
     checks = goals.random_points(generator(EVALUATION_SEED, "checks of a fit"), CHECKS)
-    error = float((np.abs(found(checks) - features(checks)) / size).max(initial=0.0))
-    return GoalFunction(goals, found.exponents, found.coefficients, error)
+    errors = (np.abs(found(checks) - features(checks)) / size).max(axis=0)
+    return GoalFunction(goals, found.exponents, found.coefficients, errors)
 
 
 def _combination(goals: Goals, points: Floats) -> np.ndarray:

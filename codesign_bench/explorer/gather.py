@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.registry import in_order
 from codesign_bench.storage.cells import StoredCell, reported_cells
 from codesign_bench.storage.policies import policy_of
-from codesign_bench.task import Floats, Singles, Sketch, Task, load_task
+from codesign_bench.task import Floats, Item, Singles, Sketch, Task, load_task
 from codesign_bench.task.episodes import Episodes, portions
 from codesign_bench.visible_text import on_one_line
 
@@ -245,19 +246,22 @@ def _start(goals: Goals) -> dict[str, Any] | None:
         function = fit(numbers, goals)
     except _ChangesShapeError:
         return None
-    if function.error > SMOOTH:
-        return None
+    # An item that jumps, such as the mark of a tool that starts clear of a body, is taken from the nearest recording.
+    ends = np.cumsum([0, *(len(_numbers_of(item)) for item in first.items)])
+    smooth = [bool((function.errors[a:b] < SMOOTH).all()) for a, b in pairwise(ends)]
+    kept = [index for (a, b), known in zip(pairwise(ends), smooth, strict=True) if known for index in range(a, b)]
     items = [
         {
+            "known": known,
             "pose": len(item.pose),
             "shapes": [
                 [shape.kind, shape.colour, len(shape.points) * len(shape.points[0]), len(shape.size), shape.rotation]
                 for shape in item.shapes
             ],
         }
-        for item in first.items
+        for item, known in zip(first.items, smooth, strict=True)
     ]
-    return {**_function(function), "items": items}
+    return {**_function(function.part(kept)), "items": items}
 
 
 class _ChangesShapeError(Exception):
@@ -274,13 +278,12 @@ def _skeleton(sketch: Sketch) -> list[Any]:
 
 def _numbers(sketch: Sketch) -> list[float]:
     """Return all numbers of a scene without its tool: item by item the pose, then points and sizes of its shapes."""
-    values: list[float] = []
-    for item in sketch.items:
-        values += item.pose
-        for shape in item.shapes:
-            values += [value for point in shape.points for value in point]
-            values += shape.size
-    return values
+    return [value for item in sketch.items for value in _numbers_of(item)]
+
+
+def _numbers_of(item: Item) -> list[float]:
+    shapes = [(*(value for point in shape.points for value in point), *shape.size) for shape in item.shapes]
+    return [*item.pose, *(value for numbers in shapes for value in numbers)]
 
 
 def _reason(message: str) -> str:

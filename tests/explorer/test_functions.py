@@ -34,3 +34,17 @@ def test_the_error_tells_of_a_jump() -> None:
         return (points[:, :1] > goals.axes[0].low + 1.0).astype(np.float64)
 
     assert fit(jump, goals).error > 0.1
+
+
+def test_features_that_jump_can_be_left_out() -> None:
+    goals = Goals.of(load_task("push"))
+
+    def both(points: Floats) -> Floats:
+        return np.stack([points[:, 0], points[:, 0] > goals.axes[0].low + 1.0], axis=1).astype(np.float64)
+
+    function = fit(both, goals)
+    assert function.errors[0] < 1e-6 < 0.1 < function.errors[1]
+    smooth = function.part([0])
+    assert len(smooth.exponents) == 2, "a constant and a slope"
+    points = goals.random_points(np.random.default_rng(0), 9)
+    np.testing.assert_allclose(smooth(points), points[:, :1], atol=1e-5)

@@ -13,10 +13,11 @@ const draw = (() => {
     return { items, toolPose: pose.slice(start, start + structure.tool) };
   }
 
-  function itemsOfStart(start, numbers) {
+  // Items that are not known for every goal are those of the nearest recorded episode, `recorded`.
+  function itemsOfStart(start, numbers, recorded = []) {
     let place = 0;
     const next = (count) => Array.from(numbers.slice(place, (place += count)));
-    return start.items.map((item) => ({
+    return start.items.map((item, i) => !item.known ? recorded[i] || { pose: [], shapes: [] } : ({
       pose: next(item.pose),
       shapes: item.shapes.map(([kind, colour, points, size, rotation]) => ({
         kind, colour, points: next(points), size: next(size), rotation,

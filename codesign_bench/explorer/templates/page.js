@@ -260,7 +260,7 @@ const page = (() => {
     const own = panel.cell.episodes[nearest];
     const frame = own[live ? 0 : Math.min(own.length - 1, Math.floor(state.time / task.period + 1e-6))];
     const { items, toolPose } = draw.itemsOfFrame(task.structures[frame.structure], frame.pose);
-    const scene = live && task.startScene ? draw.itemsOfStart(task.start, task.startScene(point)) : items;
+    const scene = live && task.startScene ? draw.itemsOfStart(task.start, task.startScene(point), items) : items;
     const tool = values && toolPose.length ? [draw.toolItem(toolKind(panel.cell), values, toolPose, task.colour)] : [];
     panel.sceneBox = box;
     draw.scene(context, box, view, [...(task.handle ? fields(panel) : []), ...scene, ...tool]);

@@ -16,7 +16,21 @@ from typing import Annotated, ClassVar, TypeAlias
 import numpy as np
 from PIL import Image, ImageDraw
 
-from codesign_bench.task import OURS, BoxPart, Floats, Frame, Given, Physics, Slots, constants
+from codesign_bench.task import (
+    OURS,
+    BoxPart,
+    Floats,
+    Frame,
+    Given,
+    Item,
+    Numbers,
+    Physics,
+    Shape,
+    Sketch,
+    Slots,
+    Viewpoint,
+    constants,
+)
 from codesign_bench.task.robot import ArmReport, DeployedSimulator
 
 from ._carriers import CARRIER_SCENE, LEVEL, Carrier, Gantry, HeldTool, ToolShape, pybullet, run
@@ -136,6 +150,8 @@ class BulletSimulator(DeployedSimulator):
         self.held: list[HeldTool | None] = [None] * num_slots
         self.tools: list[int | None] = [None] * num_slots
         """The bodies that hold the tools and include them as links."""
+        self.outlines: list[dict[int, tuple[Shape, ...]]] = [{} for _ in range(num_slots)]
+        """Shapes of every world's visible bodies except the tool, for `sketch`; PyBullet does not return them all."""
         self.bodies: Floats = np.zeros((num_slots, num_bodies, SPIN.stop))
         """(B, N, 13): `PLACE`, `ROTATION`, `VELOCITY` and `SPIN` of the moving bodies."""
         self.pose: Floats = np.zeros((num_slots, 3 + len(self.turning_axes)))
@@ -167,6 +183,7 @@ class BulletSimulator(DeployedSimulator):
                 pybullet.setPhysicsEngineParameter(contactERP=self.contact_correction, physicsClientId=world)
             pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=world)
             self.held[slot] = self.tools[slot] = None
+            self.outlines[slot] = {}
             self.moving[slot] = self.build_scene(slot)
         self.read_bodies(slots)
 
@@ -190,6 +207,7 @@ class BulletSimulator(DeployedSimulator):
             body, -1, lateralFriction=friction, linearDamping=0.0, angularDamping=0.0, physicsClientId=world
         )
         self.paint(slot, body, colour)
+        self.outlines[slot][body] = (Shape("box", colour, ((0.0, 0.0, 0.0),), tuple(half_extents), LEVEL),)
         return body
 
     def add_compound(
@@ -238,6 +256,10 @@ class BulletSimulator(DeployedSimulator):
             physicsClientId=world,
         )
         self.paint(slot, body, colour)
+        self.outlines[slot][body] = tuple(
+            Shape("box", colour, (tuple(centre),), tuple(half), LEVEL)
+            for half, centre in zip(half_extents, centres, strict=True)
+        )
         return body
 
     def paint(self, slot: int, body: int, colour: str, link: int = -1) -> None:
@@ -247,6 +269,7 @@ class BulletSimulator(DeployedSimulator):
     def hide(self, slot: int, body: int) -> None:
         """Make a body of one shape invisible in pictures."""
         pybullet.changeVisualShape(body, -1, rgbaColor=(1.0, 1.0, 1.0, 0.0), physicsClientId=self.worlds[slot])
+        self.outlines[slot].pop(body, None)
 
     def add_tools(self, slots: Slots, boxes: Boxes, poses: Floats) -> None:
         """Add a carrier with a tool of `boxes` to the worlds of `slots`, held at `poses` (b, A)."""
@@ -359,6 +382,28 @@ class BulletSimulator(DeployedSimulator):
         self.mark(slot, marks)
         return marks.frame()
 
+    def sketch(self, slot: int) -> Sketch:
+        """Return the bodies and marks of `render` as data; of an arm, only the tool."""
+        camera, (height, width), marks = self.camera, PICTURE_SHAPE, MarkList()
+        self.mark(slot, marks)
+        view = Viewpoint(camera.eye, camera.target, camera.up, camera.field_of_view, camera.near, aspect=width / height)
+        bodies = tuple(self._item(slot, body) for body in self.outlines[slot])
+        return Sketch(view, (*bodies, *marks.items), self._tool_pose(slot), COLOURS["tool"])
+
+    def _item(self, slot: int, body: int) -> Item:
+        """Return a body as data."""
+        shapes = self.outlines[slot][body]
+        place, rotation = pybullet.getBasePositionAndOrientation(body, self.worlds[slot])
+        return Item(shapes, tuple(place) if shapes[0].kind == "ball" else (*place, *rotation))
+
+    def _tool_pose(self, slot: int) -> Numbers:
+        """Return position and rotation of the held point; empty before there is a tool."""
+        held, world = self.held[slot], self.worlds[slot]
+        if held is None:
+            return ()
+        state = pybullet.getLinkState(held.body, held.tool_link, computeForwardKinematics=1, physicsClientId=world)
+        return (*state[4], *state[5])
+
     def mark(self, slot: int, marks: Marks) -> None:
         """Draw marks that are not bodies, e.g. a goal or a line, on top of the bodies. Nothing by default."""
 
@@ -408,6 +453,24 @@ def _new_world() -> int:
     with zeros_given_back():
         world: int = pybullet.connect(pybullet.DIRECT)
     return world
+
+
+class MarkList(Marks):
+    """Keeps what is drawn on it as items instead of pixels."""
+
+    def __init__(self) -> None:  # no picture, so not the parent's
+        self.items: list[Item] = []
+
+    def line(self, points: Floats, colour: str, width: int = 2) -> None:
+        """Keep a line."""
+        first = points[0, :3]
+        corners = tuple(tuple(corner) for corner in (points[:, :3] - first).tolist())
+        self.items.append(Item((Shape("line", colour, corners, (float(width),)),), tuple(first.tolist())))
+
+    def dot(self, point: Floats, colour: str, radius: int = 3) -> None:
+        """Keep a disc."""
+        shape = Shape("dot", colour, ((0.0, 0.0, 0.0),), (float(radius),))
+        self.items.append(Item((shape,), tuple(point[:3].tolist())))
 
 
 def _hand_on(worlds: list[int | None]) -> None:

@@ -23,11 +23,16 @@ from codesign_bench.task import (
     Floats,
     Frame,
     Given,
+    Item,
+    Numbers,
     Physics,
     PlanarPart,
+    Shape,
     Simulator,
+    Sketch,
     Slots,
     ToolGraph,
+    Window,
     constants,
 )
 
@@ -185,6 +190,25 @@ class PlanarSimulator(Simulator):
                     canvas.shape(shape, shape.body)
         return canvas.frame()
 
+    def sketch(self, slot: int) -> Sketch:
+        """Return the bodies and marks of `render` as data; the tool is the moving body of segments."""
+        marks, bodies = MarkList(), []
+        tool_pose: Numbers = ()
+        self.mark(slot, marks)
+        for kind in (pymunk.Body.STATIC, pymunk.Body.KINEMATIC, pymunk.Body.DYNAMIC):
+            shapes: dict[pymunk.Body, list[pymunk.Shape]] = {}
+            for shape in self.spaces[slot].shapes:
+                if shape.body is not None and shape.body.body_type == kind:
+                    shapes.setdefault(shape.body, []).append(shape)
+            for body, own in shapes.items():
+                moves = kind != pymunk.Body.STATIC
+                pose: Numbers = (*body.position, body.angle) if moves else ()
+                if moves and isinstance(own[0], pymunk.Segment):
+                    tool_pose = pose
+                else:
+                    bodies.append(Item(tuple(_outline(shape, body) for shape in own), pose))
+        return Sketch(Window(self.view.x, self.view.y), (*marks.items, *bodies), tool_pose, COLOURS["tool"])
+
     def mark(self, slot: int, canvas: Canvas) -> None:
         """Draw marks that are not bodies, e.g. a goal or a line, below the bodies. Nothing by default."""
 
@@ -212,8 +236,7 @@ class Canvas:
 
     def shape(self, shape: pymunk.Shape, body: pymunk.Body) -> None:
         """Draw a circle, segment or polygon of `body` in the colour of its body type."""
-        kind = {pymunk.Body.DYNAMIC: "object", pymunk.Body.STATIC: "scene", pymunk.Body.KINEMATIC: "tool"}
-        colour = getattr(shape, "colour", COLOURS[kind[body.body_type]])
+        colour = _colour(shape, body)
         if isinstance(shape, pymunk.Circle):
             self.circle(body.local_to_world(shape.offset), shape.radius, colour)
         elif isinstance(shape, pymunk.Segment):
@@ -243,6 +266,43 @@ class Canvas:
 
     def _at(self, point: Point) -> tuple[float, float]:
         return (point[0] - self.view.x[0]) * self._pixels, (self.view.y[1] - point[1]) * self._pixels
+
+
+class MarkList(Canvas):
+    """Keeps what is drawn on it as items instead of pixels."""
+
+    def __init__(self) -> None:  # no picture, so not the parent's
+        self.items: list[Item] = []
+
+    def circle(self, centre: Point, radius: float, colour: str, *, filled: bool = True) -> None:
+        """Keep a disc, or its outline."""
+        x, y = (float(value) for value in centre)
+        shape = Shape("disc" if filled else "ring", colour, ((0.0, 0.0),), (radius,))
+        self.items.append(Item((shape,), (x, y, 0.0)))
+
+    def segment(self, start: Point, end: Point, radius: float, colour: str) -> None:
+        """Keep a segment."""
+        (x, y), (x_end, y_end) = ([float(value) for value in point] for point in (start, end))
+        shape = Shape("segment", colour, ((0.0, 0.0), (x_end - x, y_end - y)), (radius,))
+        self.items.append(Item((shape,), (x, y, 0.0)))
+
+
+def _outline(shape: pymunk.Shape, body: pymunk.Body) -> Shape:
+    """Return a circle, segment or polygon in the frame of its body."""
+    colour = _colour(shape, body)
+    if isinstance(shape, pymunk.Circle):
+        return Shape("disc", colour, (tuple(shape.offset),), (shape.radius,))
+    if isinstance(shape, pymunk.Segment):
+        return Shape("segment", colour, (tuple(shape.a), tuple(shape.b)), (shape.radius,))
+    assert isinstance(shape, pymunk.Poly)
+    return Shape("polygon", colour, tuple(tuple(vertex) for vertex in shape.get_vertices()))
+
+
+def _colour(shape: pymunk.Shape, body: pymunk.Body) -> str:
+    """Return the shape's own colour, or that of its body's type."""
+    kind = {pymunk.Body.DYNAMIC: "object", pymunk.Body.STATIC: "scene", pymunk.Body.KINEMATIC: "tool"}
+    colour: str = getattr(shape, "colour", COLOURS[kind[body.body_type]])
+    return colour
 
 
 def chain_tool(points: Floats, friction: float) -> tuple[pymunk.Body, list[pymunk.Segment]]:

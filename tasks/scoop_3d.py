@@ -20,6 +20,7 @@ from codesign_bench.task import (
     Given,
     Physics,
     Quantity,
+    Shape,
     Simulator,
     Slots,
     Soundness,
@@ -239,6 +240,9 @@ def _ball_picture(rings: int = 6, columns: int = 9) -> tuple[list[list[float]], 
 
 BALL_PICTURE = _ball_picture()
 """Vertices (m) and triangles of a ball in pictures."""
+BALL_OUTLINE = Shape("ball", COLOURS["object"], ((0.0, 0.0, 0.0),), (BALL_RADIUS,))
+FLOOR_OUTLINE = Shape("box", FLOOR_COLOUR, ((0.0, 0.0, -FLOOR_PICTURE[2]),), FLOOR_PICTURE, LEVEL)
+"""Balls and floor in drawings outside of Python."""
 
 
 class Scoop3D(Task):
@@ -416,29 +420,31 @@ class _ScoopSimulator(BulletSimulator):
             visualFramePosition=(0, 0, -FLOOR_PICTURE[2]),
             physicsClientId=world,
         )
-        self._add_rigid(slot, floor, [[0.0, 0.0, 0.0]], picture=slab, colour=FLOOR_COLOUR)
+        self._add_rigid(slot, floor, [[0.0, 0.0, 0.0]], FLOOR_OUTLINE, picture=slab)
         (x, y), thick, middle = RESERVOIR, WALL_HALF_THICKNESS, 0.5 * WALL_HEIGHT
         for size, offset in (
             ((thick, y + 2.0 * thick, middle), (x + thick, 0.0)),
             ((x, thick, middle), (0.0, y + thick)),
         ):
             shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=size, physicsClientId=world)
-            self._add_rigid(slot, shape, [[sign * offset[0], sign * offset[1], middle] for sign in (-1.0, 1.0)])
+            outline = Shape("box", COLOURS["scene"], ((0.0, 0.0, 0.0),), size, LEVEL)
+            places = [[sign * offset[0], sign * offset[1], middle] for sign in (-1.0, 1.0)]
+            self._add_rigid(slot, shape, places, outline)
         shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=BALL_RADIUS, physicsClientId=world)
         points, triangles = BALL_PICTURE
         picture = pybullet.createVisualShape(
             pybullet.GEOM_MESH, vertices=points, indices=triangles, normals=points, physicsClientId=world
         )
-        return self._add_rigid(slot, shape, lay_balls(self.piles[slot]).tolist(), BALL_MASS, picture, COLOURS["object"])
+        return self._add_rigid(slot, shape, lay_balls(self.piles[slot]).tolist(), BALL_OUTLINE, BALL_MASS, picture)
 
     def _add_rigid(
         self,
         slot: int,
         shape: int,
         positions: list[list[float]],
+        outline: Shape,
         mass: float = 0.0,
         picture: int = -1,
-        colour: str = COLOURS["scene"],
     ) -> list[int]:
         """Add rigid bodies of one shape; a world of rigid bodies steps twice as fast as one of multibodies."""
         world = self.worlds[slot]
@@ -457,7 +463,8 @@ class _ScoopSimulator(BulletSimulator):
                 angularDamping=ANGULAR_DAMPING,
                 physicsClientId=world,
             )
-            self.paint(slot, body, colour)
+            self.paint(slot, body, outline.colour)
+            self.outlines[slot][body] = (outline,)
         return bodies
 
     def build(self, slots: Slots, designs: Floats) -> None:

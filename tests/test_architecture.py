@@ -27,7 +27,7 @@ MEMBERS = {"methods": "methods", "tasks": "tasks", "paper_figs": "paper_figs", "
 
 EVERY_METHOD = "tests/methods/test_contract.py and tests/methods/test_honesty.py ask every method"
 PRINTED = "numbers that the paper prints"
-DATA = (".j2", ".css")
+DATA = (".j2", ".css", ".js")
 """Endings of files that are installed beside the code."""
 
 TESTED_ELSEWHERE = {
@@ -38,6 +38,7 @@ TESTED_ELSEWHERE = {
     "codesign_bench/studies/corl2023/ranges.py": "names of types; tests/studies/corl2023/test_tables.py reads values",
     "codesign_bench/studies/corl2023/real_robot.py": f"{PRINTED}; tests/studies/corl2023/test_scenes.py",
     "codesign_bench/task/behaviour.py": "an interface; tests/task/test_behaviours.py and tests/task/test_play.py",
+    "codesign_bench/task/sketch.py": "data alone; tests/explorer/test_rollouts.py asks what every task makes of it",
     "codesign_bench/task/tool.py": "data alone; tests/tasks/test_contract.py asks what every task makes of it",
     "methods/_open_loop.py": f"{EVERY_METHOD}, two of which use it",
     "methods/_given_design.py": f"{EVERY_METHOD}, some of which extend it",

@@ -41,6 +41,7 @@ COMMANDS = (
     "report",
     "compare",
     "pack",
+    "explore",
     "reproduce",
     "reference",
     "headroom",

@@ -26,6 +26,11 @@ class NetworkPolicy(Policy):
         self.network = network
         self._design, self._control = design, control
 
+    @property
+    def designer(self) -> Act:
+        """The designer as a function of tensors; its designs are not clipped."""
+        return self._design
+
     def design(self, observation: Singles) -> Singles:
         """Return the designer's design."""
         return _act(self._design, observation)

@@ -9,6 +9,7 @@ from codesign_bench.task.behaviour import Behaviour
 from codesign_bench.task.loading import deployable_tasks, deployment_of, load_task, task_names, usable_tasks
 from codesign_bench.task.scene import OURS, Constant, Given, constants
 from codesign_bench.task.simulator import Physics, Simulator, Soundness
+from codesign_bench.task.sketch import Item, Numbers, Shape, Sketch, Viewpoint, Window
 from codesign_bench.task.spaces import Booleans, Box, Floats, Frame, Layout, Observed, Quantity, Singles, Slots, Span
 from codesign_bench.task.task import EVALUATION_SEED, ByProfile, Task
 from codesign_bench.task.tool import BoxPart, PlanarPart, ToolGraph, ToolPart
@@ -25,19 +26,25 @@ __all__ = [
     "Floats",
     "Frame",
     "Given",
+    "Item",
     "Layout",
+    "Numbers",
     "Observed",
     "Physics",
     "PlanarPart",
     "Quantity",
+    "Shape",
     "Simulator",
     "Singles",
+    "Sketch",
     "Slots",
     "Soundness",
     "Span",
     "Task",
     "ToolGraph",
     "ToolPart",
+    "Viewpoint",
+    "Window",
     "constants",
     "deployable_tasks",
     "deployment_of",

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codesign_bench.task.checks import NotCopied
+from codesign_bench.task.sketch import Sketch
 from codesign_bench.task.spaces import Booleans, Floats, Frame, Singles, Slots
 from codesign_bench.task.tool import ToolPart
 
@@ -157,5 +158,13 @@ class Simulator(NotCopied, ABC):
 
         Raises:
             NotImplementedError: the task draws no pictures.
+        """
+        raise NotImplementedError
+
+    def sketch(self, slot: int) -> Sketch:
+        """Return the scene in `slot` as data, for drawings outside of Python; changes nothing.
+
+        Raises:
+            NotImplementedError: the task does not say.
         """
         raise NotImplementedError

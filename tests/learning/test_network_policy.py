@@ -24,6 +24,10 @@ def test_actions_are_clipped() -> None:
     np.testing.assert_array_equal(make().act(SEEN), [[-1.0], [-1.0]])
 
 
+def test_the_designer_itself_does_not_clip() -> None:
+    assert make().designer(torch.tensor([[3.0, 1.0]])).tolist() == [[4.0]]
+
+
 def test_one_observation_gives_one_action() -> None:
     assert make().design(SEEN[0]).tolist() == [0.5]
     assert make().act(SEEN[1]).shape == (1,)

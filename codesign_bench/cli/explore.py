@@ -35,15 +35,16 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.cli.arguments import chosen_methods, chosen_tasks
     from codesign_bench.explorer.gather import Choice
     from codesign_bench.explorer.page import write_explorer
+    from codesign_bench.storage.places import results_folder
     from codesign_bench.storage.survey import lines, survey
 
-    say = printer(console)
-    tell_left_out(lines(options.results, survey(options.results)))
+    say, results = printer(console), results_folder(options.results)
+    tell_left_out(lines(results, survey(results)))
     choice = Choice(
         tasks=tuple(chosen_tasks(options.task, say)) if options.task else (),
         methods=tuple(chosen_methods(options.method, say)) if options.method else (),
         seeds=tuple(parse_seeds(options.seeds)) if options.seeds else (),
         goals=options.goals,
     )
-    write_explorer(options.results, options.out, say, choice)
+    write_explorer(results, options.out, say, choice)
     return 0

@@ -46,6 +46,7 @@ COMMANDS = (
     "deploy",
     "export",
     "bench",
+    "doctor",
 )
 """The modules of the commands, in the order of `--help`; each defines HELP, `add_arguments` and `run`."""
 

@@ -34,6 +34,7 @@ COMMANDS = (
     "list",
     "show",
     "run",
+    "rerun",
     "tune",
     "status",
     "plot",

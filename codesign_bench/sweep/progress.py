@@ -18,10 +18,8 @@ from rich.table import Table
 from codesign_bench.cell.cell import Cell
 from codesign_bench.console import duration, number, printer
 from codesign_bench.errors import UserError
-from codesign_bench.storage.json_fields import number as json_number
-from codesign_bench.storage.layout import PROGRESS_FILE
-from codesign_bench.storage.reading import UnusableFile, read_json
 from codesign_bench.storage.records import DONE, CellRecord
+from codesign_bench.storage.status import read_progress
 
 POLL_SECONDS = 1.0
 LINE_SECONDS = 10.0
@@ -134,7 +132,7 @@ class ProgressDisplay:
     def snapshot(self) -> Snapshot:
         """Return the current progress of the sweep."""
         remaining = dict(self._remaining)
-        running = [(cell, found) for cell in remaining if (found := self._read(cell)) is not None]
+        running = [(cell, found) for cell in remaining if (found := read_progress(cell.folder(self.out), self._since))]
         speeds, taken = self._speeds.of(running), {cell: found["env_steps"] for cell, found in running}
         in_turn = sorted(remaining, key=lambda cell: cell not in taken)  # those that run are ahead of those that wait
         known = [cell for cell in in_turn if kind_of(cell) in speeds]
@@ -147,15 +145,6 @@ class ProgressDisplay:
             seconds_left=seconds_until_done(seconds, max(self._workers, len(running))) if known else None,
             unknown=len(remaining) - len(known),
         )
-
-    def _read(self, cell: Cell) -> dict[str, Any] | None:
-        try:
-            found = read_json(cell.folder(self.out) / PROGRESS_FILE)
-            for name in ("updated", "env_steps", "steps", "steps_per_second"):
-                json_number(found, name)
-            return dict(found) if found["updated"] >= self._since else None
-        except (OSError, UnusableFile, ValueError, KeyError, TypeError, AttributeError):
-            return None
 
     def _poll(self) -> None:
         next_line = time.monotonic() + LINE_SECONDS

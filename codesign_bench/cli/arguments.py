@@ -93,6 +93,18 @@ def add_same_code(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add whether progress and results are printed for programs."""
+    parser.add_argument(
+        "--json", action="store_true", help="print lines of JSON, one event each, for programs that follow the command"
+    )
+
+
+def add_dry_run(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add whether a command only says what it would do: `what`."""
+    parser.add_argument("--dry-run", action="store_true", help=f"run nothing: {what}")
+
+
 def add_config(parser: argparse.ArgumentParser) -> None:
     """Add what determines a cell's configuration: profile, budget and individual settings."""
     add_profile(parser)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import Jobs, OfKind, add_results, chosen_tasks, out_folder, path
+from codesign_bench.cli.arguments import Jobs, OfKind, add_json, add_results, chosen_tasks, out_folder, path
 from codesign_bench.config.values import Within
 from codesign_bench.console import Log, printer, tell_left_out
 from codesign_bench.errors import UserError
@@ -37,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--task", nargs="+", metavar="T", help="with --update: names, or all; default: the tasks of the cells at hand"
     )
     add_results(parser, out_folder)
+    add_json(parser)
     parser.add_argument(
         "--instances",
         type=OfKind(Instances),

@@ -7,7 +7,7 @@ import os
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import ALL, Jobs, OfKind, add_results, chosen_tasks, out_folder
+from codesign_bench.cli.arguments import ALL, Jobs, OfKind, add_json, add_results, chosen_tasks, out_folder
 from codesign_bench.console import printer, tell_left_out
 
 HELP = "measure reference points: idling, random tools, the script, the best single tool, the best known"
@@ -17,6 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the tasks, the results folder and what is measured again."""
     parser.add_argument("--task", nargs="+", default=[ALL], metavar="T", help="names, or all (default)")
     add_results(parser, out_folder)
+    add_json(parser)
     parser.add_argument(
         "--again", action="store_true", help="also measure what is there, e.g. after a change to a task's scene"
     )

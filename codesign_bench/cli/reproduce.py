@@ -13,6 +13,7 @@ from codesign_bench.cli.arguments import (
     DEFAULT_RESULTS,
     OfKind,
     add_jobs,
+    add_json,
     add_out,
     add_profile,
     add_same_code,
@@ -36,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_jobs(parser)
     add_out(parser, DEFAULT_RESULTS)
     add_same_code(parser)
+    add_json(parser)
     parser.add_argument(
         "--figures",
         type=out_folder,

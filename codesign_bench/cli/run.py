@@ -18,6 +18,7 @@ from codesign_bench.cli.arguments import (
     OfKind,
     add_config,
     add_jobs,
+    add_json,
     add_out,
     add_same_code,
     add_sweep,
@@ -71,6 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_out(parser, DEFAULT_RESULTS)
     add_sweep(parser)
     add_same_code(parser)
+    add_json(parser)
     parser.add_argument(
         "--dry-run",
         action="store_true",

@@ -12,13 +12,13 @@ from typing import Annotated
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import OfKind, add_results
+from codesign_bench.cli.arguments import OfKind, add_json, add_results
 from codesign_bench.config.values import Within
-from codesign_bench.console import print_table, printer, tell_left_out
+from codesign_bench.console import JsonLines, print_table, printer, tell_left_out
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import scan
 from codesign_bench.storage.records import RUNNING
-from codesign_bench.storage.status import status_row
+from codesign_bench.storage.status import status_event, status_row
 from codesign_bench.storage.survey import lines, survey
 
 HELP = "list the cells in a results folder and their progress"
@@ -33,6 +33,7 @@ LOOK_SHARE = 0.1
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the results folder."""
     add_results(parser)
+    add_json(parser)
     parser.add_argument(
         "--watch",
         nargs="?",
@@ -88,8 +89,13 @@ def print_status(console: Console, out: Path, *, clear: bool = False) -> int:
     tell_left_out(left_out)
     if not cells:
         raise UserError(f"no cells in '{out}' yet; run some with: codesign-bench run --out {out}")
-    print_table(console, ("cell", "status", "env_steps", "of", "return", "success"), rows)
     counts = Counter(cell.status for cell in cells)
+    if isinstance(console, JsonLines):
+        for cell in cells:
+            console.event("cell", status_event(out, cell))
+        console.event("status", {"cells": len(cells), **counts})
+        return counts[RUNNING]
+    print_table(console, ("cell", "status", "env_steps", "of", "return", "success"), rows)
     log(f"{len(cells)} cells: {', '.join(f'{count} {status}' for status, count in sorted(counts.items()))}")
     for cell in cells:
         if cell.record.failure is not None:

@@ -12,6 +12,7 @@ from codesign_bench.cli.arguments import (
     ALL,
     OfKind,
     add_jobs,
+    add_json,
     add_profile,
     add_same_code,
     add_study,
@@ -44,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_jobs(parser)
     add_sweep(parser)
     add_same_code(parser)
+    add_json(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

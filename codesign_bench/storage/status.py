@@ -47,3 +47,17 @@ def status_row(out: Path, cell: StoredCell) -> tuple[str, ...]:
         number(last.get("return_mean")),
         number(last.get("success_rate")),
     )
+
+
+def status_event(out: Path, cell: StoredCell) -> dict[str, Any]:
+    """Return the same as `status_row` for programs, with the error of a failed cell."""
+    last, failure = cell.last_evaluation(), cell.record.failure
+    return {
+        "cell": cell.folder.relative_to(out).as_posix(),
+        "status": cell.status,
+        "env_steps": env_steps_of(cell),
+        "steps": cell.record.config.run["steps"].value,
+        "return_mean": last.get("return_mean"),
+        "success_rate": last.get("success_rate"),
+        "failure": None if failure is None else failure.last_line,
+    }

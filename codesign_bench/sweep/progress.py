@@ -16,7 +16,7 @@ from rich.live import Live
 from rich.table import Table
 
 from codesign_bench.cell.cell import Cell
-from codesign_bench.console import duration, number, printer
+from codesign_bench.console import duration, number, printer, tell
 from codesign_bench.errors import UserError
 from codesign_bench.storage.records import DONE, CellRecord
 from codesign_bench.storage.status import read_progress
@@ -49,6 +49,19 @@ class Snapshot:
         elif self.finished < self.cells:
             parts.append("cells are starting")
         return ", ".join([*parts, self._left()])
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the progress as an event for programs."""
+        told = ("phase", "env_steps", "steps", "steps_per_second", "return_mean", "success_rate")
+        running = [{"cell": cell.name, **{name: found.get(name) for name in told}} for cell, found in self.running]
+        return {
+            "cells": self.cells,
+            "ended": self.finished,
+            "running": running,
+            "steps_per_second": self.steps_per_second,
+            "seconds_left": self.seconds_left,
+            "cells_of_unknown_speed": self.unknown,
+        }
 
     def _left(self) -> str:
         if self.seconds_left is None:
@@ -97,7 +110,7 @@ class ProgressDisplay:
     """A thread that polls the cells' progress files; a context manager around the sweep."""
 
     def __init__(self, console: Console, out: Path, budgets: dict[Cell, int], workers: int = 1) -> None:
-        self._console, self.out, self.budgets, self._workers = console, out, budgets, workers
+        self.console, self.out, self.budgets, self._workers = console, out, budgets, workers
         self._speeds = Speeds()
         self._remaining = dict(budgets)
         self._since = time.time()
@@ -119,7 +132,7 @@ class ProgressDisplay:
 
     def say(self, line: str) -> None:
         """Print a line above the live table."""
-        printer(self._console)(line)
+        printer(self.console)(line)
 
     def ended(self, cell: Cell) -> None:
         """Count `cell` as ended, and remember its speed."""
@@ -153,7 +166,9 @@ class ProgressDisplay:
                 self._live.update(progress_table(self.snapshot()), refresh=True)
             elif time.monotonic() >= next_line:
                 next_line += LINE_SECONDS
-                self.say(self.snapshot().line())
+                snapshot = self.snapshot()
+                if not tell(self.console, "progress", **snapshot.to_json()):
+                    self.say(snapshot.line())
 
 
 def progress_table(snapshot: Snapshot) -> Table:

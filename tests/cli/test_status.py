@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,17 @@ def test_errors_of_cells_control_no_terminal(tmp_path: Path, capsys: pytest.Capt
     store_cell(tmp_path, status=FAILED, failure=Failure("\x1b[2J", "\x1b]0;mine\x07"))
     assert main(["status", "--results", str(tmp_path)]) == 0
     assert capsys.readouterr().out.splitlines()[-1].endswith(r": \x1b]0;mine\x07")
+
+
+def test_for_programs_every_cell_is_an_event(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store_cell(tmp_path, curve=[{"env_steps": 900, "return_mean": 1.5}])
+    store_cell(tmp_path, seed=1, status=FAILED, failure=Failure("broke", "Traceback\nRuntimeError: broke\n"))
+    assert main(["status", "--json", "--results", str(tmp_path)]) == 0
+    first, second, counts = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert (first["cell"], first["status"]) == ("push/gnn_ppo/default/seed-00", "done")
+    assert (first["env_steps"], first["steps"], first["return_mean"]) == (900, 1000, 1.5)
+    assert second["failure"] == "RuntimeError: broke"
+    assert (counts["cells"], counts["done"], counts["failed"]) == (2, 1, 1)
 
 
 def test_watching_goes_on_while_a_cell_runs_and_ends_some_time_after(tmp_path: Path) -> None:

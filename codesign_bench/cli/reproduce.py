@@ -12,6 +12,7 @@ from codesign_bench.cli.arguments import (
     DEFAULT_FIGURES,
     DEFAULT_RESULTS,
     OfKind,
+    add_dry_run,
     add_jobs,
     add_json,
     add_out,
@@ -32,12 +33,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_study(parser)
     add_profile(parser)
     parser.add_argument(
-        "--seeds", type=OfKind(Count), metavar="N", help="number of seeds per configuration (default: the study's)"
+        "--seeds",
+        type=OfKind(Count),
+        metavar="N",
+        help="number of seeds per configuration, a count such as 3 (default: the study's)",
     )
     add_jobs(parser)
     add_out(parser, DEFAULT_RESULTS)
     add_same_code(parser)
     add_json(parser)
+    add_dry_run(parser, "list all cells, with the expected time and memory")
     parser.add_argument(
         "--figures",
         type=out_folder,
@@ -63,4 +68,5 @@ def run(options: argparse.Namespace, console: Console) -> int:
         jobs=options.jobs,
         seeds=options.seeds,
         same_code=options.same_code,
+        only_plan=options.dry_run,
     )

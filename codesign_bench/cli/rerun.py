@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import add_jobs, add_json, add_out, path
+from codesign_bench.cli.arguments import add_dry_run, add_jobs, add_json, add_out, path
 
 HELP = "run a stored cell again from its cell.json, and say whether the curve is the same"
 DEFAULT_RERUNS = Path("results/reruns")
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_out(parser, DEFAULT_RERUNS)
     add_jobs(parser)
     add_json(parser)
-    parser.add_argument("--dry-run", action="store_true", help="run nothing: say what would run, and how long it takes")
+    add_dry_run(parser, "say what would run, with the expected time and memory")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

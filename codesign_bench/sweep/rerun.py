@@ -38,8 +38,7 @@ def rerun(given: Path, out: Path, *, console: Console, jobs: int | None = None, 
     chain = _with_pretrained(stored)
     cells = [cell_of(each) for each in chain]
     if only_plan:
-        # A cell that starts from another one can be planned only when that is done.
-        return dry_run(resolve_cells(cells[:1]), out, console=console, jobs=jobs)
+        return dry_run(resolve_cells(cells), out, console=console, jobs=jobs)
     for cell in cells:
         if (code := run_sweep(resolve_cells([cell]), out, console=console, jobs=jobs)) != EXIT_ALL_DONE:
             return code

@@ -124,10 +124,12 @@ def dry_run(
     jobs: int | None = None,
     retry_failed: bool = False,
     same_code: bool = False,
+    most_timed: int | None = None,
 ) -> int:
     """Print what `run_sweep` would do with every cell, and how long it would take; return 0.
 
-    Kinds of cells that have not been timed on this machine are, for some seconds each, outside of `out`.
+    Kinds of cells that have not been timed on this machine are, for some seconds each, outside of `out`; only the first
+    `most_timed` of them if that is not None. Cells may start from others among `cells`, as in stages that follow.
 
     Raises:
         UserError: the same that `run_sweep` raises before anything runs.
@@ -137,9 +139,10 @@ def dry_run(
             refuse_other_files(out)
         except OSError as error:
             raise UserError(f"--out {out}: not readable ({error.strerror})") from error
-    plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code)
+    together = {cell.cell.name for cell in cells}
+    plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code, promised=together)
     say, known = printer(console), known_paces(out)
-    for kind, pending in untimed(plan.pending, known).items():
+    for kind, pending in list(untimed(plan.pending, known).items())[:most_timed]:
         say(f"timing {pending.cell.task}/{pending.cell.method} ...")
         try:
             known[kind] = measure(pending.resolved)[0]

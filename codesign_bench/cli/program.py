@@ -15,6 +15,7 @@ from rich.console import Console
 
 from codesign_bench import __version__
 from codesign_bench.cli.arguments import module_name
+from codesign_bench.cli.completion import answer_shell
 from codesign_bench.console import json_lines, steady_streams
 from codesign_bench.errors import UserError
 from codesign_bench.plugins import import_modules
@@ -49,6 +50,7 @@ COMMANDS = (
     "export",
     "bench",
     "doctor",
+    "completion",
 )
 """The modules of the commands, in the order of `--help`; each defines HELP, `add_arguments` and `run`."""
 
@@ -82,6 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
+    answer_shell(build_parser)
     try:
         options = build_parser().parse_args(arguments)
     except SystemExit as stop:  # --help, --version and bad input

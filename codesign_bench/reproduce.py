@@ -38,6 +38,7 @@ def reproduce(
     seeds: int | None = None,
     same_code: bool = False,
     only_plan: bool = False,
+    tensorboard: bool = False,
 ) -> int:
     """Run the missing cells of `wanted`, measure, plot, verify and report; return 0, or 1 if a cell failed.
 
@@ -61,7 +62,15 @@ def reproduce(
         f"environment steps, then {measures} measurements; --dry-run lists them, with the expected time"
     )
     for cells in stages:
-        code = max(code, run_sweep(resolve_cells(cells), results, console=console, jobs=jobs, same_code=same_code))
+        outcome = run_sweep(
+            resolve_cells(cells),
+            results,
+            console=console,
+            jobs=jobs,
+            same_code=same_code,
+            tensorboard=tensorboard,
+        )
+        code = max(code, outcome)
     for name, experiment in experiments.items():
         for measure in experiment.measures:
             _attempt(f"measurement of {name}", partial(measure, results, profile, log), log)

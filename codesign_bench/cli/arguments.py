@@ -105,6 +105,15 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_tensorboard(parser: argparse.ArgumentParser) -> None:
+    """Add whether curves and metrics are also written for TensorBoard."""
+    parser.add_argument(
+        "--tensorboard",
+        action="store_true",
+        help="also write curves and metrics as TensorBoard scalars, live: tensorboard --logdir DIR",
+    )
+
+
 def add_dry_run(parser: argparse.ArgumentParser, what: str) -> None:
     """Add whether a command only says what it would do: `what`."""
     parser.add_argument("--dry-run", action="store_true", help=f"run nothing: {what}")

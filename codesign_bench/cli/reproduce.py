@@ -19,6 +19,7 @@ from codesign_bench.cli.arguments import (
     add_profile,
     add_same_code,
     add_study,
+    add_tensorboard,
     out_folder,
 )
 from codesign_bench.config.profiles import profile_named
@@ -42,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_out(parser, DEFAULT_RESULTS)
     add_same_code(parser)
     add_json(parser)
+    add_tensorboard(parser)
     add_dry_run(parser, "list all cells, with the expected time and memory")
     parser.add_argument(
         "--figures",
@@ -68,5 +70,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
         jobs=options.jobs,
         seeds=options.seeds,
         same_code=options.same_code,
+        tensorboard=options.tensorboard,
         only_plan=options.dry_run,
     )

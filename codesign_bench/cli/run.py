@@ -23,6 +23,7 @@ from codesign_bench.cli.arguments import (
     add_out,
     add_same_code,
     add_sweep,
+    add_tensorboard,
     check_device,
     check_once,
     chosen_methods,
@@ -79,6 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_sweep(parser)
     add_same_code(parser)
     add_json(parser)
+    add_tensorboard(parser)
     add_dry_run(parser, "list what would run, be resumed or skipped, with the expected time and memory")
 
 
@@ -110,7 +112,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         return dry_run(resolved, options.out, console=console, **settings)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does
     where = {"backend": options.backend, "scheduler": options.scheduler}
-    return run_sweep(resolved, options.out, console=console, **settings, **where)
+    return run_sweep(resolved, options.out, console=console, tensorboard=options.tensorboard, **settings, **where)
 
 
 def tuned_cells(cells: Iterable[Cell], path: Path) -> list[Cell]:

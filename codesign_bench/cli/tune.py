@@ -18,6 +18,7 @@ from codesign_bench.cli.arguments import (
     add_same_code,
     add_study,
     add_sweep,
+    add_tensorboard,
     chosen_names,
     out_folder,
 )
@@ -47,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_sweep(parser)
     add_same_code(parser)
     add_json(parser)
+    add_tensorboard(parser)
     add_dry_run(parser, "print the plan of --plan, and how long each method takes, which is measured")
 
 
@@ -79,4 +81,5 @@ def run(options: argparse.Namespace, console: Console) -> int:
         backend=options.backend,
         scheduler=options.scheduler,
         same_code=options.same_code,
+        tensorboard=options.tensorboard,
     )

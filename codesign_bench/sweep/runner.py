@@ -27,6 +27,7 @@ from codesign_bench.sweep.estimate import estimate, event_of, fitting, known_pac
 from codesign_bench.sweep.pace import Kind, NotTimed, Pace, measure, remember
 from codesign_bench.sweep.plan import Plan, make_plan
 from codesign_bench.sweep.progress import ProgressDisplay
+from codesign_bench.sweep.tensorboard import Follower, check_tensorboard
 from codesign_bench.sweep.workers import BUSY, Job, Outcome
 
 EXIT_ALL_DONE, EXIT_SOME_FAILED = 0, 1
@@ -81,14 +82,19 @@ def run_sweep(
     backend: str = "loky",
     scheduler: str | None = None,
     same_code: bool = False,
+    tensorboard: bool = False,
 ) -> int:
     """Run every cell that is not done in `out`; return 0 if all are done at the end, 1 if some failed.
+
+    With `tensorboard`, their curves and metrics are also written as scalars, while they run.
 
     Raises:
         UserError: bad input, found before anything runs.
         KeyboardInterrupt: the user stopped the sweep; its processes have ended, and the same call resumes it.
     """
     plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code)
+    if tensorboard:
+        check_tensorboard()
     known = known_paces(out)
     used_jobs, split = _split(cells, plan, jobs, known)
     chosen = make_backend(backend, used_jobs, scheduler)
@@ -108,7 +114,8 @@ def run_sweep(
             imported = os.environ.get(IMPORTS_VARIABLE, "")
             queue = [Job(pending.cell, str(out), retry_failed, imported, same_code) for pending in plan.pending]
             budgets = {pending.cell: pending.resolved.config.run.steps for pending in plan.pending}
-            with ProgressDisplay(console, out, budgets, used_jobs) as display:
+            followed = Follower(list(budgets), out) if tensorboard else nullcontext()
+            with followed, ProgressDisplay(console, out, budgets, used_jobs) as display:
                 _run_queue(queue, workers, display, trouble)
     code = _conclude(say, len(cells), trouble, plan)
     named = {status: [cell.name for cell in given] for status, given in trouble.by_status().items()}

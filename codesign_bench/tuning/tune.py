@@ -79,6 +79,7 @@ def tune(
     backend: str = "loky",
     scheduler: str | None = None,
     same_code: bool = False,
+    tensorboard: bool = False,
 ) -> int:
     """Run the missing cells of a study's search and write its files; return 0, or 1 if some cell failed.
 
@@ -101,6 +102,7 @@ def tune(
         backend=backend,
         scheduler=scheduler,
         same_code=same_code,
+        tensorboard=tensorboard,
     )
     alive = [
         setting

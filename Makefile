@@ -1,5 +1,5 @@
 # Two commands on a fresh machine: `make run` and `make test`. Each sets up what it needs in .venv first.
-# Only Python 3.10 or 3.11, pip and make are assumed. Every recipe runs in this folder, whatever its path.
+# Only Python 3.10 to 3.13, pip and make are assumed. Every recipe runs in this folder, whatever its path.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -8,7 +8,7 @@ SHELL := /bin/bash
 # What is set in the caller's shell must not leak into the environment made here.
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
-PYTHON ?= $(shell for name in python3.11 python3.10 python3; do \
+PYTHON ?= $(shell for name in python3.11 python3.10 python3.12 python3.13 python3; do \
 	$$name -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null && { echo $$name; break; }; done)
 PIP_FLAGS ?=
 # Where to look for PyTorch without CUDA, which is several GB smaller; empty: take what the default index gives.

@@ -11,9 +11,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from importlib.metadata import PackageNotFoundError, entry_points, requires, version
-from typing import TypeAlias
-
-from packaging.requirements import Requirement
+from typing import TYPE_CHECKING, TypeAlias
 
 from codesign_bench.code_version import code_version
 from codesign_bench.errors import UserError, in_one_line
@@ -31,6 +29,9 @@ from codesign_bench.processes import THREAD_VARIABLES
 from codesign_bench.registry import KINDS, load_module, names
 from codesign_bench.startup import PROGRAM
 from codesign_bench.task import load_task
+
+if TYPE_CHECKING:
+    from packaging.requirements import Requirement
 
 Section: TypeAlias = Mapping[str, str]
 """What is told -> its value, in the order of printing."""
@@ -89,8 +90,12 @@ def _gpu() -> str:
 def _threads() -> Section:
     """Return the cores, the thread pools of this process, and what is set in the environment."""
     settings = {name: os.environ[name] for name in THREAD_VARIABLES if name in os.environ}
+    try:
+        cores = str(available_cores())
+    except ImportError as error:  # where the environments alone are installed
+        cores = f"unknown number ({error.name} is not installed)"
     found = {
-        "cores": f"{available_cores()} of {os.cpu_count()} may be used",
+        "cores": f"{cores} of {os.cpu_count()} may be used",
         **_pools(),
         **settings,
         **host_facts(threads=1)["library_settings"],
@@ -120,10 +125,15 @@ def _count(threads: int) -> str:
 
 
 def _requirements() -> list[Requirement]:
-    """Return what the installed package requires, with its extras; nothing if it is not installed but on the path."""
+    """Return what the installed package requires, with its extras; nothing if it is not installed but on the path.
+
+    Neither can it be told where the environments alone are installed, without what reads requirements.
+    """
     try:
+        from packaging.requirements import Requirement
+
         return [Requirement(text) for text in requires(PROGRAM) or ()]
-    except PackageNotFoundError:
+    except (PackageNotFoundError, ImportError):
         return []
 
 

@@ -1,5 +1,5 @@
 # Two commands on a fresh machine: `make run` and `make test`. Each sets up what it needs in .venv first.
-# Only Python 3.10 or 3.11, pip and make are assumed. Every recipe runs in this folder, whatever its path.
+# Only Python 3.10 to 3.13, pip and make are assumed. Every recipe runs in this folder, whatever its path.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -8,8 +8,10 @@ SHELL := /bin/bash
 # What is set in the caller's shell must not leak into the environment made here.
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
-PYTHON ?= $(shell for name in python3.11 python3.10 python3; do \
+PYTHON ?= $(shell for name in python3.11 python3.10 python3.12 python3.13 python3; do \
 	$$name -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null && { echo $$name; break; }; done)
+# The newest Python here; its 3D tasks use another build of the physics engine.
+NEWEST ?= $(shell for name in python3.13 python3.12 python3; do command -v $$name >/dev/null && { echo $$name; break; }; done)
 PIP_FLAGS ?=
 # Where to look for PyTorch without CUDA, which is several GB smaller; empty: take what the default index gives.
 TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
@@ -35,7 +37,7 @@ WITHOUT_AVX := ATEN_CPU_CAPABILITY=default MKL_CBWR=COMPATIBLE ONEDNN_MAX_CPU_IS
 	NPY_DISABLE_CPU_FEATURES=X86_V3,AVX2,FMA3,X86_V4,AVX512F,AVX512_SKX,AVX512_ICL,AVX512_SPR \
 	GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA
 
-.PHONY: help run test test-portable without-avx512 without-avx check slow package install clean
+.PHONY: help run test test-environments test-portable without-avx512 without-avx check slow package install clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 22
@@ -52,6 +54,16 @@ test: .venv/installed-test ## set up, check style and types, run the fast tests
 
 test-portable: .venv/installed-test ## run the tests that compare numbers under other instruction sets
 	$(MAKE) --no-print-directory -j2 --output-sync=target without-avx512 without-avx
+
+test-environments: .venv-environments/installed ## install the environments alone on the newest Python; compare their trajectories
+	OMP_NUM_THREADS=1 .venv-environments/bin/python -m pytest -q --noconftest -p no:cacheprovider \
+		tests/tasks/test_frozen_scenes.py
+
+.venv-environments/installed: requirements-envs.txt $(SETUP)
+	$(NEWEST) -m venv .venv-environments
+	.venv-environments/bin/python -m pip install $(PIP_FLAGS) -c constraints.txt -r requirements-envs.txt pytest
+	.venv-environments/bin/python -m pip install $(PIP_FLAGS) --no-deps -e .
+	touch $@
 
 without-avx512: .venv/installed-test
 	$(WITHOUT_AVX512) $(NUMERIC_TESTS)
@@ -73,7 +85,7 @@ package: ## build the wheels of program and reference results, install them in a
 install: .venv/installed-test ## set up an environment for development in .venv
 
 clean: ## remove the environment and what tools left behind; results stay
-	rm -rf .venv build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache
+	rm -rf .venv .venv-environments build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache
 	rm -rf reference_package/build reference_package/*.egg-info reference_package/codesign_bench_reference/reference
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

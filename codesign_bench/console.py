@@ -1,13 +1,20 @@
-"""Console output: lines, tables and the numbers in them, and streams that may stop being read at any time."""
+"""Console output: lines, tables and the numbers in them, and streams that may stop being read at any time.
+
+For programs, all of it comes as lines of JSON instead, one event each.
+"""
 
 from __future__ import annotations
 
 import errno
+import json
+import math
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from typing import Any, TypeAlias
+from datetime import datetime, timezone
+from typing import IO, Any, TypeAlias, cast
 
 from rich.console import Console
 from rich.table import Table
@@ -18,8 +25,77 @@ Log: TypeAlias = Callable[[str], None]
 """A function that shows the user one line."""
 
 
+class JsonLines(Console):
+    """A console that writes events, each a JSON object on a line: the lines and tables of others, and numbers.
+
+    Every event has `event`, its kind, and `time`, UTC in ISO 8601.
+    """
+
+    def __init__(self, stream: Any = None) -> None:
+        super().__init__(file=cast(IO[str], sys.stdout if stream is None else stream), force_terminal=False)
+        self._lock_of_lines = threading.Lock()
+
+    def event(self, kind: str, values: Mapping[str, Any]) -> None:
+        """Write an event."""
+        time = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
+        line = json.dumps(_plain({"event": kind, "time": time, **values}), allow_nan=False)
+        with self._lock_of_lines:
+            self.file.write(f"{line}\n")
+            self.file.flush()
+
+
+def _plain(value: Any) -> Any:
+    """Return a value that JSON can hold: numbers of other libraries as Python's, those that are not finite as null."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(entry) for name, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, str | bool | int) or value is None:
+        return value
+    if isinstance(value, float) or hasattr(value, "__float__"):
+        number = float(value)
+        return number if math.isfinite(number) else None
+    return str(value)
+
+
+def tell(console: Console, kind: str, **values: Any) -> bool:
+    """Write an event if this console writes JSON; return whether it does."""
+    if isinstance(console, JsonLines):
+        console.event(kind, values)
+        return True
+    return False
+
+
+@contextmanager
+def json_lines() -> Iterator[JsonLines]:
+    """Return a console that writes JSON to standard output, and nothing else gets there: it goes to standard error.
+
+    Libraries of others print to standard output, some of them without Python.
+    """
+    try:
+        number = sys.stdout.fileno()
+        own = os.dup(number)
+    except (OSError, ValueError, AttributeError):  # it is no file, as in tests
+        yield JsonLines()
+        return
+    before, sys.stdout = sys.stdout, sys.stderr
+    os.dup2(sys.__stderr__.fileno() if sys.__stderr__ else 2, number)
+    stream = SteadyStream(os.fdopen(os.dup(own), "w", encoding="utf-8"))
+    try:
+        yield JsonLines(stream)
+    finally:
+        stream.flush()
+        stream.close()
+        sys.stdout = before
+        os.dup2(own, number)
+        os.close(own)
+
+
 def printer(console: Console) -> Log:
     """Return a function that prints a line verbatim: no markup, no colours, no truncation, no control sequences."""
+    if isinstance(console, JsonLines):
+        events = console
+        return lambda line: events.event("message", {"text": line})
 
     def log(line: str) -> None:
         console.print(visible(line), markup=False, highlight=False, soft_wrap=True)
@@ -51,7 +127,11 @@ def duration(seconds: float) -> str:
 
 
 def print_table(console: Console, headings: Sequence[str], table_rows: Sequence[Sequence[str]]) -> None:
-    """Print a table: with borders on a terminal, as aligned lines without truncation elsewhere."""
+    """Print a table: with borders on a terminal, as aligned lines without truncation elsewhere, as events in JSON."""
+    if isinstance(console, JsonLines):
+        for row in table_rows:
+            console.event("row", dict(zip(headings, row, strict=True)))
+        return
     table_rows = [[on_one_line(text) for text in row] for row in table_rows]
     if console.is_terminal:
         table = Table()

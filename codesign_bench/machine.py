@@ -15,6 +15,8 @@ from codesign_bench import __version__
 
 PACKAGES = ("numpy", "torch", "scipy", "pymunk", "pybullet", "cma", "gymnasium")
 """Those that decide numbers."""
+FORKS = {"pybullet": "pybullet-arm64"}
+"""Package -> another one that brings the same module, where there is no wheel of the first."""
 C_LIBRARY = "c_library"
 """Beside the packages: the library whose sine and exponential the physics engines call."""
 INSTRUCTION_SETS = (
@@ -53,12 +55,18 @@ def package_versions() -> dict[str, str | None]:
     """
     found: dict[str, str | None] = {"python": platform.python_version(), "codesign_bench": __version__}
     for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = None
+        found[name] = _version(name)
+        if found[name] is None and name in FORKS and (other := _version(FORKS[name])):
+            found[name] = f"{other} ({FORKS[name]})"
     found[C_LIBRARY] = " ".join(platform.libc_ver()).strip() or None
     return found
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
 
 
 def host_facts(threads: int) -> dict[str, Any]:

@@ -18,10 +18,12 @@ from codesign_bench.report.page import write_report
 from codesign_bench.storage.survey import lines, survey
 from codesign_bench.study.experiment import stages_of
 from codesign_bench.study.study import Study
-from codesign_bench.sweep.runner import EXIT_ALL_DONE, run_sweep
+from codesign_bench.sweep.runner import EXIT_ALL_DONE, dry_run, run_sweep
 
 CLAIMS_FOLDER, REPORT_FILE = "claims", "report.html"
 """Next to the folder of figures."""
+MOST_TIMED = 12
+"""Kinds of cells that a dry run times, some seconds each: a study may have hundreds (ours)."""
 
 
 def reproduce(
@@ -35,8 +37,12 @@ def reproduce(
     jobs: int | None = None,
     seeds: int | None = None,
     same_code: bool = False,
+    only_plan: bool = False,
+    tensorboard: bool = False,
 ) -> int:
     """Run the missing cells of `wanted`, measure, plot, verify and report; return 0, or 1 if a cell failed.
+
+    With `only_plan`, nothing is run: every cell is listed, with the expected time of all of them together.
 
     Raises:
         UserError: bad input, or none of the figures can be drawn.
@@ -46,9 +52,25 @@ def reproduce(
     log(f"reproducing {', '.join(experiments)} of {study.name} with the profile {profile}")
     stages = stages_of(list(experiments.values()), profile, seeds)
     usable = set(usable_cells((cell for cells in stages for cell in cells), log))
-    for stage in stages:
-        if cells := [cell for cell in stage if cell in usable]:
-            code = max(code, run_sweep(resolve_cells(cells), results, console=console, jobs=jobs, same_code=same_code))
+    stages = [cells for stage in stages if (cells := [cell for cell in stage if cell in usable])]
+    together = resolve_cells([cell for cells in stages for cell in cells])
+    if only_plan:
+        return dry_run(together, results, console=console, jobs=jobs, same_code=same_code, most_timed=MOST_TIMED)
+    measures = sum(len(experiment.measures) for experiment in experiments.values())
+    log(
+        f"{len(together)} cells in {len(stages)} stages, at most {sum(cell.config.run.steps for cell in together):,} "
+        f"environment steps, then {measures} measurements; --dry-run lists them, with the expected time"
+    )
+    for cells in stages:
+        outcome = run_sweep(
+            resolve_cells(cells),
+            results,
+            console=console,
+            jobs=jobs,
+            same_code=same_code,
+            tensorboard=tensorboard,
+        )
+        code = max(code, outcome)
     for name, experiment in experiments.items():
         for measure in experiment.measures:
             _attempt(f"measurement of {name}", partial(measure, results, profile, log), log)

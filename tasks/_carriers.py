@@ -12,17 +12,16 @@ from typing import Annotated
 
 import numpy as np
 
-from codesign_bench.errors import UnavailableError
 from codesign_bench.task import OURS, Given, constants
 from codesign_bench.task.robot import ArmReport
 
 try:
     import pybullet as pybullet
-except ModuleNotFoundError as error:
-    raise UnavailableError(
-        "3D tasks need pybullet, which is not installed (it has wheels for Python 3.10 and 3.11): pip install pybullet"
-    ) from error
+except ModuleNotFoundError:
+    pybullet = None
 
+MISSING = "" if pybullet else "3D tasks need pybullet, which is not installed: see Installation in README.md"
+"""`Task.missing` of tasks in a PyBullet world: they can be described without it, but not played."""
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 """The identity rotation."""
 CARRIAGE_MASS: Annotated[float, Given("kg", OURS)] = 0.1

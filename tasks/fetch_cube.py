@@ -41,7 +41,7 @@ from ._bullet import (
     box_parts,
     rotations_about,
 )
-from ._carriers import Carrier
+from ._carriers import MISSING, Carrier
 from ._deployed import (
     DEPLOYED_SCENE,
     NEAR_MISS,
@@ -256,6 +256,7 @@ class FetchCube(Task):
     """
 
     name = "fetch_cube"
+    missing = MISSING
     title = "Fetch cube"
     scene: ClassVar = {**BULLET_SCENE, **DEPLOYED_SCENE, **constants(__name__)}
     horizon = HORIZON

@@ -43,7 +43,7 @@ from ._bullet import (
     rotation_matrices,
     rotations_about,
 )
-from ._carriers import Carrier
+from ._carriers import MISSING, Carrier
 from ._deployed import (
     DEPLOYED_SCENE,
     NEAR_MISS,
@@ -265,6 +265,7 @@ class LiftCup(Task):
     """
 
     name = "lift_cup"
+    missing = MISSING
     title = "Lift cup"
     version = 2
     scene: ClassVar = {**BULLET_SCENE, **DEPLOYED_SCENE, **constants(__name__)}

@@ -45,7 +45,7 @@ from ._bullet import (
     rotation_matrices,
     rotations_about,
 )
-from ._carriers import pybullet
+from ._carriers import MISSING, pybullet
 from ._scene import COLOURS, Clock
 
 PAPER = "paper, table of 3D scoop"
@@ -301,6 +301,7 @@ class Scoop3D(Task):
     """
 
     name = "scoop_3d"
+    missing = MISSING
     version = 2
     title = "Scoop (3D)"
     scene: ClassVar = {**BULLET_SCENE, **constants(__name__)}

@@ -75,6 +75,7 @@ OF_NO_MODULE = {
     "tests/test_command_lines.py": "of the whole program, on input that it must refuse",
     "tests/test_working_folder.py": "of the whole program, in a folder with modules of the user",
     "tests/test_architecture.py": "of the code as a whole",
+    "tests/test_environments_alone.py": "of the environments, in a Python that lacks all other packages",
     "tests/test_hostile_files.py": "of every command, on results folders with damaged files",
     "tests/test_packaging.py": "of the package as it installs",
     "tests/test_reference_package.py": "of the package of reference results",

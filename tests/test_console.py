@@ -4,12 +4,25 @@ from __future__ import annotations
 
 import errno
 import io
+import json
+import subprocess
 import sys
 
+import numpy as np
 import pytest
 from rich.console import Console
 
-from codesign_bench.console import duration, number, print_table, printer, steady_streams, tell_left_out
+from codesign_bench.console import (
+    JsonLines,
+    duration,
+    json_lines,
+    number,
+    print_table,
+    printer,
+    steady_streams,
+    tell,
+    tell_left_out,
+)
 
 
 def test_durations_have_the_largest_unit_that_fits() -> None:
@@ -30,6 +43,42 @@ def test_text_of_results_controls_no_terminal(terminal: bool) -> None:
         assert shown in stream.getvalue()
     assert "\x07" not in stream.getvalue()
     assert "\x1b[2J" not in stream.getvalue()
+
+
+def test_for_programs_lines_tables_and_numbers_are_events() -> None:
+    stream = io.StringIO()
+    console = JsonLines(stream)
+    printer(console)("a line \x1b]0;title\x07\n of two")
+    print_table(console, ("cell", "steps"), [("push", "1,000"), ("scoop", "2,000")])
+    assert tell(console, "numbers", some=[np.float64(0.5), np.int64(3), float("nan"), None], more={"a": True})
+    assert not tell(Console(file=stream), "numbers")
+    events = [json.loads(line) for line in stream.getvalue().splitlines()]
+    assert [{name: value for name, value in event.items() if name != "time"} for event in events] == [
+        {"event": "message", "text": "a line \x1b]0;title\x07\n of two"},
+        {"event": "row", "cell": "push", "steps": "1,000"},
+        {"event": "row", "cell": "scoop", "steps": "2,000"},
+        {"event": "numbers", "some": [0.5, 3, None, None], "more": {"a": True}},
+    ]
+    assert all("\x1b" not in line for line in stream.getvalue().splitlines())
+
+
+def test_what_libraries_print_is_not_among_the_events() -> None:
+    line = (
+        "import os; from codesign_bench.console import json_lines, printer\n"
+        "with json_lines() as console:\n"
+        "    os.write(1, b'of a library\\n'); print('of another'); printer(console)('ours')\n"
+        "os.write(1, b'after\\n')"
+    )
+    done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
+    first, last = done.stdout.splitlines()
+    assert (json.loads(first)["text"], last) == ("ours", "after")
+    assert set(done.stderr.splitlines()) == {"of a library", "of another"}
+
+
+def test_events_go_where_standard_output_goes(capsys: pytest.CaptureFixture[str]) -> None:
+    with json_lines() as console:
+        printer(console)("ours")
+    assert json.loads(capsys.readouterr().out)["text"] == "ours"
 
 
 def test_what_is_left_out_is_told_on_standard_error(capsys: pytest.CaptureFixture[str]) -> None:

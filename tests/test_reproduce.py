@@ -69,6 +69,22 @@ def test_what_is_measured_follows_the_cells_and_a_failure_is_said(tmp_path: Path
 
 
 @pytest.mark.usefixtures("toy")
+def test_a_dry_run_lists_the_cells_of_all_stages_and_runs_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    fine = replace(DEFAULTS, seeds=(0,), variants=(Variant.of(finetune=1),))
+    console = Console(record=True, width=300, file=io.StringIO())
+    experiment = Experiment(("learning_curves",), "ours", ((DEFAULTS,), (fine,)))
+    folders = {"results": tmp_path / "runs", "figures": tmp_path / "figures"}
+    study, options = study_of(experiment), {"profile": "laptop", "jobs": 1, "only_plan": True}
+    assert reproduce(study, ["toy"], console=console, **folders, **options) == 0
+    text = console.export_text()
+    assert [line.split()[1] for line in text.splitlines() if "/seed-0" in line] == ["run", "run", "run"]
+    assert "3 cells, 3 to run" in text
+    assert "expected to take" in text
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.usefixtures("toy")
 def test_nothing_drawn_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="nothing can be drawn of toy"):
         run(Experiment(("tradeoff",), "ours"), tmp_path)

@@ -61,7 +61,6 @@ def test_all_runs_the_rest_and_names_what_it_leaves_out_once(tmp_path: Path) -> 
     [
         ("run", "--method", "cma_es", "--task", "push", "scoop_3d", *QUICK),
         ("run", "--method", "cma_es", "--task", "all,fetch_cube", *QUICK),
-        ("show", "--method", "cma_es", "--task", "lift_cup"),
         ("render", "--task", "scoop_3d", "--out", "a.gif"),
         ("bench", "tasks", "--task", "scoop_3d"),
         ("bench", "learner", "--task", "scoop_3d"),
@@ -76,6 +75,12 @@ def test_a_task_by_its_name_is_refused_in_one_line(
     (line,) = command(*arguments, status=2)
     assert "is not available: " + REASON in line
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_configuration_is_shown_all_the_same() -> None:
+    lines = command("show", "--method", "cma_es", "--task", "fetch_cube")
+    assert any(line.split()[:2] == ["task", "version"] for line in lines)
+    assert any(line.split()[:2] == ["run", "steps"] for line in lines)
 
 
 @SLOW

@@ -87,8 +87,8 @@ class ResolvedCell:
         return problem
 
 
-def resolve_cell(cell: Cell) -> ResolvedCell:
-    """Return the cell with its task, method and configuration.
+def resolve_cell(cell: Cell, *, plays: bool = True) -> ResolvedCell:
+    """Return the cell with its task, method and configuration; with `plays=False` it can be described, but not run.
 
     Raises:
         UserError: an unknown name, or an invalid value.
@@ -101,7 +101,7 @@ def resolve_cell(cell: Cell) -> ResolvedCell:
             for name, (value, source) in axis_named(axis).run_overrides(config.run).items():
                 run = replace(config.run, **{name: value})
                 config = replace(config, run=run, sources={**config.sources, f"run.{name}": source})
-    return ResolvedCell(cell, load_task(cell.task), method_class, config)
+    return ResolvedCell(cell, load_task(cell.task, plays=plays), method_class, config)
 
 
 def usable_cells(cells: Iterable[Cell], log: Log) -> list[Cell]:
@@ -112,8 +112,10 @@ def usable_cells(cells: Iterable[Cell], log: Log) -> list[Cell]:
     return [cell for cell in given if cell.task in tasks and cell.method in methods]
 
 
-def resolve_cells(cells: Sequence[Cell]) -> list[ResolvedCell]:
+def resolve_cells(cells: Sequence[Cell], *, plays: bool = True) -> list[ResolvedCell]:
     """Resolve every cell; check that methods have the overridden settings and that tasks can have the variants.
+
+    With `plays=False`, they can be described, but not run.
 
     Raises:
         UserError: a check fails; names the first.
@@ -124,4 +126,4 @@ def resolve_cells(cells: Sequence[Cell]) -> list[ResolvedCell]:
     for task_name, variant in dict.fromkeys((cell.task, cell.variant) for cell in cells):
         for axis, value in variant:
             axis_named(axis).check(value, load_task(task_name))
-    return [resolve_cell(cell) for cell in cells]
+    return [resolve_cell(cell, plays=plays) for cell in cells]

@@ -7,18 +7,23 @@ import errno
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
 
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.config.resolve import split_override
 from codesign_bench.config.run_settings import Steps, Threads
 from codesign_bench.config.values import parse_value, printable, shown
-from codesign_bench.console import Log, silent
+from codesign_bench.console import Log, printer, silent, tell
 from codesign_bench.errors import UserError, unknown_name
 from codesign_bench.registry import KINDS, names
 from codesign_bench.storage.places import REFERENCE
 from codesign_bench.study import DEFAULT_STUDY, load_study
 from codesign_bench.visible_text import visible
+
+if TYPE_CHECKING:
+    from codesign_bench.evaluation.expected import Work
 
 DEFAULT_RESULTS = Path("results/runs")
 DEFAULT_FIGURES = Path("results/figures")
@@ -96,6 +101,34 @@ def add_same_code(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="count and resume cells although the code of their task or method was changed since",
     )
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add whether progress and results are printed for programs."""
+    parser.add_argument(
+        "--json", action="store_true", help="print lines of JSON, one event each, for programs that follow the command"
+    )
+
+
+def add_tensorboard(parser: argparse.ArgumentParser) -> None:
+    """Add whether curves and metrics are also written for TensorBoard."""
+    parser.add_argument(
+        "--tensorboard",
+        action="store_true",
+        help="also write curves and metrics as TensorBoard scalars, live: tensorboard --logdir DIR",
+    )
+
+
+def add_dry_run(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add whether a command only says what it would do: `what`."""
+    parser.add_argument("--dry-run", action="store_true", help=f"run nothing: {what}")
+
+
+def tell_work(console: Console, what: str, work: Work) -> None:
+    """Say what would be played: on which task, or for which cell."""
+    values = {"episodes": work.episodes, "steps": work.env_steps, "expected_seconds": work.seconds}
+    if not tell(console, "plan", of=what, **values):
+        printer(console)(f"{what}: {work.line() if work.episodes else 'nothing to play'}")
 
 
 def add_config(parser: argparse.ArgumentParser) -> None:

@@ -8,9 +8,19 @@ from typing import Annotated, Any
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import Jobs, OfKind, add_results, chosen_tasks, own_results, path
+from codesign_bench.cli.arguments import (
+    Jobs,
+    OfKind,
+    add_dry_run,
+    add_json,
+    add_results,
+    chosen_tasks,
+    own_results,
+    path,
+    tell_work,
+)
 from codesign_bench.config.values import Within
-from codesign_bench.console import Log, printer, tell_left_out
+from codesign_bench.console import JsonLines, print_table, printer, tell_left_out
 from codesign_bench.errors import UserError
 
 HELP = "find better tools for a policy's own controller, and better episodes of every evaluation instance"
@@ -37,6 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--task", nargs="+", metavar="T", help="with --update: names, or all; default: the tasks of the cells at hand"
     )
     add_results(parser, own_results)
+    add_json(parser)
+    add_dry_run(parser, "say how many episodes would be played for each policy and task, and how long that takes")
     parser.add_argument(
         "--instances",
         type=OfKind(Instances),
@@ -76,11 +88,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise UserError("headroom: --task needs --update; a cell knows its task")
     if options.random_tools is not None and not options.policy:
         raise UserError("headroom: --random-tools needs --policy CELL")
-    log = printer(console)
     if options.policy:
-        _measure(options, log)
+        _measure(options, console)
     if options.update:
-        _update(options, log)
+        _update(options, console)
+    if options.dry_run:
+        printer(console)("nothing was played")
     return 0
 
 
@@ -89,26 +102,36 @@ def _given(options: argparse.Namespace, *names: str) -> dict[str, Any]:
     return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
 
 
-def _measure(options: argparse.Namespace, log: Log) -> None:
-    from codesign_bench.evaluation.headroom import Budget, measure_cell, summary
+def _measure(options: argparse.Namespace, console: Console) -> None:
+    from codesign_bench.evaluation.headroom import Budget, expected_work, measure_cell, summary
     from codesign_bench.text_tables import markdown
 
-    budget = Budget(**_given(options, *OF_SEARCHES, "random_tools"))
+    log, budget = printer(console), Budget(**_given(options, *OF_SEARCHES, "random_tools"))
+    if options.dry_run:
+        limits = {"instances": options.instances, "jobs": options.jobs}
+        for folder in options.policy:
+            tell_work(console, str(folder), expected_work(folder, options.results, budget, **limits))
+        return
     paths = [
         measure_cell(folder, options.results, budget, log, instances=options.instances, jobs=options.jobs)
         for folder in options.policy
     ]
-    log(markdown(*summary(paths)).rstrip())
+    header, rows = summary(paths)
+    if isinstance(console, JsonLines):
+        print_table(console, header, rows)
+    else:
+        log(markdown(header, rows).rstrip())
 
 
-def _update(options: argparse.Namespace, log: Log) -> None:
-    from codesign_bench.evaluation.best_known import Search, update
+def _update(options: argparse.Namespace, console: Console) -> None:
+    from codesign_bench.evaluation.best_known import Search, expected_work, update
     from codesign_bench.evaluation.reference_points import renew_best_known
     from codesign_bench.storage.cells import find_cells, open_cell
     from codesign_bench.storage.survey import lines, survey
     from codesign_bench.task import load_task
 
     results: Path = options.results
+    log = printer(console)
     tell_left_out(lines(results, survey(results)))
     cells = [*(open_cell(folder) for folder in options.policy), *(find_cells(results) if results.is_dir() else ())]
     cells = list({cell.folder.resolve(): cell for cell in cells}.values())
@@ -118,6 +141,9 @@ def _update(options: argparse.Namespace, log: Log) -> None:
     search = Search(**_given(options, *OF_SEARCHES))
     for name in chosen_tasks(options.task or present, log):
         task = load_task(name)
+        tell_work(console, name, expected_work(task, cells, search, instances=options.instances))
+        if options.dry_run:
+            continue
         done = update(results, task, cells, search, log, instances=options.instances)
         log(f"{name}: {len(done.improved)} instances improved in {done.env_steps:,} environment steps")
         if not renew_best_known(results, task):

@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
@@ -14,7 +15,8 @@ from rich.console import Console
 
 from codesign_bench import __version__
 from codesign_bench.cli.arguments import module_name
-from codesign_bench.console import steady_streams
+from codesign_bench.cli.completion import answer_shell
+from codesign_bench.console import json_lines, steady_streams
 from codesign_bench.errors import UserError
 from codesign_bench.plugins import import_modules
 from codesign_bench.processes import children_with_safe_modules, existing_folder
@@ -34,6 +36,7 @@ COMMANDS = (
     "list",
     "show",
     "run",
+    "rerun",
     "tune",
     "status",
     "plot",
@@ -49,6 +52,8 @@ COMMANDS = (
     "deploy",
     "export",
     "bench",
+    "doctor",
+    "completion",
 )
 """The modules of the commands, in the order of `--help`; each defines HELP, `add_arguments` and `run`."""
 
@@ -82,6 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
+    answer_shell(build_parser)
     try:
         options = build_parser().parse_args(arguments)
     except SystemExit as stop:  # --help, --version and bad input
@@ -90,7 +96,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         _leave_deleted_folder(options)
         import_modules(options.imports)
         raise_on_interrupt()  # from here on there may be something to save
-        return int(options.command(options, Console()))
+        with json_lines() if getattr(options, "json", False) else nullcontext(Console()) as console:
+            return int(options.command(options, console))
     except UserError as error:
         print(f"{PROGRAM}: {in_few_lines(str(error))}", file=sys.stderr)
         return EXIT_BAD_INPUT

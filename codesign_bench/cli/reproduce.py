@@ -12,11 +12,14 @@ from codesign_bench.cli.arguments import (
     DEFAULT_FIGURES,
     DEFAULT_RESULTS,
     OfKind,
+    add_dry_run,
     add_jobs,
+    add_json,
     add_out,
     add_profile,
     add_same_code,
     add_study,
+    add_tensorboard,
     out_folder,
 )
 from codesign_bench.config.profiles import profile_named
@@ -31,11 +34,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_study(parser)
     add_profile(parser)
     parser.add_argument(
-        "--seeds", type=OfKind(Count), metavar="N", help="number of seeds per configuration (default: the study's)"
+        "--seeds",
+        type=OfKind(Count),
+        metavar="N",
+        help="number of seeds per configuration, a count such as 3 (default: the study's)",
     )
     add_jobs(parser)
     add_out(parser, DEFAULT_RESULTS)
     add_same_code(parser)
+    add_json(parser)
+    add_tensorboard(parser)
+    add_dry_run(parser, "list all cells, with the expected time and memory")
     parser.add_argument(
         "--figures",
         type=out_folder,
@@ -61,4 +70,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
         jobs=options.jobs,
         seeds=options.seeds,
         same_code=options.same_code,
+        tensorboard=options.tensorboard,
+        only_plan=options.dry_run,
     )

@@ -17,10 +17,13 @@ from codesign_bench.cli.arguments import (
     DEFAULT_RESULTS,
     OfKind,
     add_config,
+    add_dry_run,
     add_jobs,
+    add_json,
     add_out,
     add_same_code,
     add_sweep,
+    add_tensorboard,
     check_device,
     check_once,
     chosen_methods,
@@ -44,7 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--method", required=True, nargs="+", metavar="M", help="names, all (the paper's five), or beyond (all others)"
     )
     parser.add_argument("--task", required=True, nargs="+", metavar="T", help="names, or all")
-    parser.add_argument("--seeds", default="1", help="a count (6 is 0-5), a list (0,3,5) or a range (2-4); default: 1")
+    parser.add_argument(
+        "--seeds",
+        default="1",
+        metavar="N|A,B|A-B",
+        help="a count (6 is 0-5), a list (0,3,5), a range (2-4), or both (0,3-5); default: 1, which is seed 0 alone",
+    )
     add_config(parser)
     parser.add_argument(
         "--tuned", type=path, metavar="FILE", help="settings that `tune` found for each task and method (tuned.json)"
@@ -71,11 +79,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_out(parser, DEFAULT_RESULTS)
     add_sweep(parser)
     add_same_code(parser)
-    parser.add_argument(
-        "--dry-run",
-        action="store_true",
-        help="run nothing: list what would run, be resumed or skipped, with the expected time and memory",
-    )
+    add_json(parser)
+    add_tensorboard(parser)
+    add_dry_run(parser, "list what would run, be resumed or skipped, with the expected time and memory")
 
 
 # Modules that import pandas or torch are imported inside functions, so that `list` and `--help` need neither.
@@ -106,7 +112,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         return dry_run(resolved, options.out, console=console, **settings)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does
     where = {"backend": options.backend, "scheduler": options.scheduler}
-    return run_sweep(resolved, options.out, console=console, **settings, **where)
+    return run_sweep(resolved, options.out, console=console, tensorboard=options.tensorboard, **settings, **where)
 
 
 def tuned_cells(cells: Iterable[Cell], path: Path) -> list[Cell]:

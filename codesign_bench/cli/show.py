@@ -37,7 +37,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         steps=options.steps,
         overrides=tuple(options.overrides),
     )
-    (resolved,) = resolve_cells([cell])
+    (resolved,) = resolve_cells([cell], plays=False)
     searched = {(METHOD, name): str(found) for name, found in ranges(resolved.config.method).items()}
     kinds = {RUN: kinds_of(RunSettings), METHOD: kinds_of(resolved.method_class.config_class)}
     rows = [("task", "version", str(resolved.task.version), resolved.task.name, "", "")]

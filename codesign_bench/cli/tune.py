@@ -11,11 +11,14 @@ from rich.console import Console
 from codesign_bench.cli.arguments import (
     ALL,
     OfKind,
+    add_dry_run,
     add_jobs,
+    add_json,
     add_profile,
     add_same_code,
     add_study,
     add_sweep,
+    add_tensorboard,
     chosen_names,
     out_folder,
 )
@@ -44,10 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_jobs(parser)
     add_sweep(parser)
     add_same_code(parser)
+    add_json(parser)
+    add_tensorboard(parser)
+    add_dry_run(parser, "print the plan of --plan, and how long each method takes, which is measured")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Search, or print the plan; return 1 if a cell failed."""
+    from codesign_bench.tuning.expected import dry_run
     from codesign_bench.tuning.tune import part_of, print_plan, tune, tuning_of, usable_part
 
     study = load_study(options.study)
@@ -58,12 +65,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.plan:
         print_plan(console, tuning, options.profile, options.steps)
         return 0
+    out = DEFAULT_FOLDER / study.name if options.out is None else options.out
+    if options.dry_run:
+        return dry_run(console, tuning, options.profile, options.steps, out, options.jobs)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM stops a sweep as Ctrl-C does
     return tune(
         study.name,
         tuning,
         profile=options.profile,
-        out=DEFAULT_FOLDER / study.name if options.out is None else options.out,
+        out=out,
         console=console,
         steps=options.steps,
         jobs=options.jobs,
@@ -71,4 +81,5 @@ def run(options: argparse.Namespace, console: Console) -> int:
         backend=options.backend,
         scheduler=options.scheduler,
         same_code=options.same_code,
+        tensorboard=options.tensorboard,
     )

@@ -72,7 +72,7 @@ def resolve(
             task.
     """
     chosen = profile_named(profile)
-    of_task = sourced(load_task(task_name).run_settings.get(profile, {}), f"tuned for {task_name} (ours)")
+    of_task = sourced(load_task(task_name, plays=False).run_settings.get(profile, {}), f"tuned for {task_name} (ours)")
     run_values, run_sources = _start(RunSettings, {**chosen.run, **of_task})
     method_values, method_sources = _start(
         method_class.config_class,

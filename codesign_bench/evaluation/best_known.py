@@ -23,6 +23,7 @@ from codesign_bench.config.values import Within
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.evaluation.expected import Work, steps_per_second
 from codesign_bench.evaluation.headroom import DESIGNER, SearchBudget, Sigma, fingerprint, name_of
 from codesign_bench.evaluation.plans import plans_of, replay
 from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
@@ -139,6 +140,19 @@ def update(
     if search.candidates >= search.popsize:
         _search(results, state, search, log, instances)
     return state
+
+
+def expected_work(task: Task, cells: Sequence[StoredCell], search: Search, *, instances: int | None = None) -> Work:
+    """Return what `update` would play, with the same arguments; policies take some time in addition."""
+    count = task.num_evaluation_instances
+    own = [cell for cell in cells if cell.record.task == task.name and cell.is_done and cell.has_policy]
+    # The script and each policy are played once and played again, and so is the best tool of its headroom.
+    episodes = count * (2 + 4 * len(own))
+    if search.candidates >= search.popsize:
+        searched = count if instances is None else min(instances, count)
+        candidates = search.candidates // search.popsize * search.popsize
+        episodes += searched * (1 + min(search.neighbours, count - 1) + candidates + 2)
+    return Work(task, episodes, steps_per_second(task))
 
 
 def _take_from(cell: StoredCell, results: Path, state: Update, log: Log) -> None:

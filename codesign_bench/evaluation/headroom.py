@@ -25,6 +25,7 @@ from codesign_bench.config.values import Within
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.evaluation.expected import Work, steps_per_second
 from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
 from codesign_bench.method import Policy, Problem
 from codesign_bench.seeding import generator
@@ -144,20 +145,11 @@ def measure_cell(
     cell = open_cell(folder)
     policy_name = fingerprint(cell)
     controller = _controller(folder, policy_name)
-    path = path_of(results, cell.record)
-    known = rows_of(path)
-    _refuse_other(path, known, {"policy": policy_name, "task_version": cell.record.task_version, **asdict(budget)})
-    values_path = path_of(results, cell.record, VALUES_FOLDER)
-    _refuse_other(
-        values_path,
-        rows_of(values_path, DESIGN_VALUES),
-        {"policy": policy_name, "task_version": cell.record.task_version},
-    )
-    done = {row["instance"] for row in known}
-    count = len(controller.instances)
-    missing = [index for index in range(count if instances is None else min(instances, count)) if index not in done]
+    path, values_path = path_of(results, cell.record), path_of(results, cell.record, VALUES_FOLDER)
+    missing = _missing(cell, policy_name, controller, results, budget, instances)
     if missing:
-        log(f"trying other tools on {len(missing)} instances of {name_of(cell)}; kept in {path}")
+        told = _work(controller, len(missing), budget, jobs).line()
+        log(f"trying other tools on {len(missing)} instances of {name_of(cell)}: {told}; kept in {path}")
         tools = controller.designs()
         calls = (delayed(_measure)(folder, policy_name, tools, index, budget) for index in missing)
         try:
@@ -169,6 +161,42 @@ def measure_cell(
         finally:
             _controller.cache_clear()  # its simulator must not outlive this module, nor take memory any longer
     return path
+
+
+def expected_work(folder: Path, results: Path, budget: Budget, *, instances: int | None = None, jobs: int = 1) -> Work:
+    """Return what `measure_cell` would play, with the same arguments; the policy itself takes some time in addition.
+
+    Raises:
+        UserError: as `measure_cell`.
+    """
+    cell = open_cell(folder)
+    policy_name = fingerprint(cell)
+    controller = _controller(folder, policy_name)
+    return _work(controller, len(_missing(cell, policy_name, controller, results, budget, instances)), budget, jobs)
+
+
+def _work(controller: Controller, missing: int, budget: Budget, jobs: int) -> Work:
+    task, count = controller.problem.task, len(controller.instances)
+    generations = budget.candidates // budget.popsize
+    episodes = missing * (count + budget.random_tools + generations * budget.popsize)
+    return Work(task, episodes, steps_per_second(task), jobs)
+
+
+def _missing(
+    cell: StoredCell, policy_name: str, controller: Controller, results: Path, budget: Budget, instances: int | None
+) -> list[int]:
+    """Return the instances that the cell's table lacks, the first `instances` of all.
+
+    Raises:
+        UserError: the table is of another policy or another budget.
+    """
+    path, count = path_of(results, cell.record), len(controller.instances)
+    known, played = rows_of(path), {"policy": policy_name, "task_version": cell.record.task_version}
+    _refuse_other(path, known, {**played, **asdict(budget)})
+    values_path = path_of(results, cell.record, VALUES_FOLDER)
+    _refuse_other(values_path, rows_of(values_path, DESIGN_VALUES), played)
+    done = {row["instance"] for row in known}
+    return [index for index in range(count if instances is None else min(instances, count)) if index not in done]
 
 
 def summary(paths: Sequence[Path]) -> tuple[list[str], list[list[str]]]:

@@ -19,6 +19,7 @@ from codesign_bench.cell.variant import DEFAULT
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.evaluation.expected import Work, steps_per_second
 from codesign_bench.evaluation.sensitivity import GOALS, RANDOM_TOOLS, play_tools, stored_table, tools_of
 from codesign_bench.registry import in_order
 from codesign_bench.seeding import generator
@@ -161,9 +162,31 @@ def measure_missing(results: Path, tasks: Iterable[str], log: Log, *, again: boo
         task = load_task(name)
         points = [] if again else _stored(task, results)
         if not points:
-            log(f"playing the reference points of {name}; kept in {results / FILE}")
+            told = expected_work(results, task, again=again, jobs=jobs).line()
+            log(f"playing the reference points of {name}: {told}; kept in {results / FILE}")
             points = measure(task, jobs=jobs, tried=None if again else stored_table(results, name))
         _write(results, task, known, points)
+
+
+def expected_work(results: Path, task: Task, *, again: bool = False, jobs: int = 1) -> Work:
+    """Return what `measure_missing` would play on a task; nothing if the points are there.
+
+    Raises:
+        UnusableFile: what the folder has cannot be used.
+    """
+    count, episodes = task.num_evaluation_instances, 0
+    if again or not _stored(task, results):
+        episodes = 2 * count
+        try:
+            task.script()
+        except UserError:
+            pass
+        else:
+            episodes += count + FINALISTS * count
+            if again or stored_table(results, task.name) is None:
+                first = task.evaluation_instances()[:GOALS]
+                episodes += len(tools_of(task, first, RANDOM_TOOLS)) * len(first)
+    return Work(task, episodes, steps_per_second(task), jobs)
 
 
 def renew_best_known(results: Path, task: Task) -> bool:

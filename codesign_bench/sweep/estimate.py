@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from codesign_bench.console import duration
 from codesign_bench.errors import UserError
@@ -67,6 +68,17 @@ class Estimate:
         peaks = [cell.pace.peak_mb for cell in self.cells if cell.pace is not None and cell.pace.peak_mb is not None]
         return sum(sorted(peaks, reverse=True)[: self.jobs]) if peaks else None
 
+    def to_json(self) -> dict[str, Any]:
+        """Return the totals as an event for programs; seconds are those of the cells whose pace is known."""
+        known = self.unknown < len(self.cells)
+        return {
+            "jobs": self.jobs,
+            "steps": sum(cell.pending.resolved.config.run.steps - cell.pending.env_steps for cell in self.cells),
+            "expected_seconds": self.seconds if known else None,
+            "cells_of_unknown_speed": self.unknown,
+            "memory_mb": self.megabytes,
+        }
+
     def line(self) -> str:
         """Return the time and the memory as one line."""
         if self.unknown == len(self.cells):
@@ -119,6 +131,20 @@ def fitting(cells: Iterable[Pending], known: Mapping[Kind, Pace]) -> int | None:
 def gigabytes(megabytes: float) -> str:
     """Return an amount of memory in GB."""
     return f"{megabytes / 1024.0:.1f} GB"
+
+
+def event_of(cell: Expected) -> dict[str, Any]:
+    """Return the same as `row` for programs."""
+    pace, run = cell.pace, cell.pending.resolved.config.run
+    return {
+        "cell": cell.pending.cell.name,
+        "state": cell.state,
+        "steps": run.steps,
+        "env_steps": cell.pending.env_steps,
+        "expected_seconds": cell.seconds,
+        "memory_mb": None if pace is None else pace.peak_mb,
+        "known_from": None if pace is None else pace.source,
+    }
 
 
 def row(cell: Expected) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,8 +47,17 @@ class Plan:
     """How the code differs from that of stored cells, one line each."""
 
 
-def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = False, same_code: bool = False) -> Plan:
+def make_plan(
+    cells: Sequence[ResolvedCell],
+    out: Path,
+    *,
+    retry_failed: bool = False,
+    same_code: bool = False,
+    promised: Collection[str] = (),
+) -> Plan:
     """Sort `cells` into done, failed and pending ones in `out`, before anything runs.
+
+    Cells may start from others that are not done yet if these, given by their names, are `promised`.
 
     Raises:
         UserError: a stored cell has another configuration, was run with other code of its task or method (unless
@@ -63,7 +72,7 @@ def make_plan(cells: Sequence[ResolvedCell], out: Path, *, retry_failed: bool = 
             _set_aside(plan, resolved.cell, error)
     readable = [resolved for resolved in cells if resolved.cell in records]
     _refuse_other_configurations(readable, records, out)
-    _refuse_without_pretrained([resolved.cell for resolved in readable], out)
+    _refuse_without_pretrained([resolved.cell for resolved in readable], out, promised)
     stored = [StoredWith(resolved, record) for resolved in readable if (record := records[resolved.cell]) is not None]
     if not same_code:
         refuse_other_code([*stored, *pretrained(readable, out)], out)
@@ -120,9 +129,9 @@ def _refuse_other_configurations(
         raise UserError(f"{cell.folder(out)}{others} was run with another configuration: {shown}\nchoose another --out")
 
 
-def _refuse_without_pretrained(cells: Sequence[Cell], out: Path) -> None:
+def _refuse_without_pretrained(cells: Sequence[Cell], out: Path, promised: Collection[str]) -> None:
     for cell in cells:
-        if (before := cell.pretrained) is not None:
+        if (before := cell.pretrained) is not None and before.name not in promised:
             record = CellRecord.read(before.folder(out))
             if record is None or record.status != DONE:
                 raise UserError(

@@ -16,12 +16,10 @@ from rich.live import Live
 from rich.table import Table
 
 from codesign_bench.cell.cell import Cell
-from codesign_bench.console import duration, number, printer
+from codesign_bench.console import duration, number, printer, tell
 from codesign_bench.errors import UserError
-from codesign_bench.storage.json_fields import number as json_number
-from codesign_bench.storage.layout import PROGRESS_FILE
-from codesign_bench.storage.reading import UnusableFile, read_json
 from codesign_bench.storage.records import DONE, CellRecord
+from codesign_bench.storage.status import read_progress
 
 POLL_SECONDS = 1.0
 LINE_SECONDS = 10.0
@@ -51,6 +49,19 @@ class Snapshot:
         elif self.finished < self.cells:
             parts.append("cells are starting")
         return ", ".join([*parts, self._left()])
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the progress as an event for programs."""
+        told = ("phase", "env_steps", "steps", "steps_per_second", "return_mean", "success_rate")
+        running = [{"cell": cell.name, **{name: found.get(name) for name in told}} for cell, found in self.running]
+        return {
+            "cells": self.cells,
+            "ended": self.finished,
+            "running": running,
+            "steps_per_second": self.steps_per_second,
+            "seconds_left": self.seconds_left,
+            "cells_of_unknown_speed": self.unknown,
+        }
 
     def _left(self) -> str:
         if self.seconds_left is None:
@@ -99,7 +110,7 @@ class ProgressDisplay:
     """A thread that polls the cells' progress files; a context manager around the sweep."""
 
     def __init__(self, console: Console, out: Path, budgets: dict[Cell, int], workers: int = 1) -> None:
-        self._console, self.out, self.budgets, self._workers = console, out, budgets, workers
+        self.console, self.out, self.budgets, self._workers = console, out, budgets, workers
         self._speeds = Speeds()
         self._remaining = dict(budgets)
         self._since = time.time()
@@ -121,7 +132,7 @@ class ProgressDisplay:
 
     def say(self, line: str) -> None:
         """Print a line above the live table."""
-        printer(self._console)(line)
+        printer(self.console)(line)
 
     def ended(self, cell: Cell) -> None:
         """Count `cell` as ended, and remember its speed."""
@@ -134,7 +145,7 @@ class ProgressDisplay:
     def snapshot(self) -> Snapshot:
         """Return the current progress of the sweep."""
         remaining = dict(self._remaining)
-        running = [(cell, found) for cell in remaining if (found := self._read(cell)) is not None]
+        running = [(cell, found) for cell in remaining if (found := read_progress(cell.folder(self.out), self._since))]
         speeds, taken = self._speeds.of(running), {cell: found["env_steps"] for cell, found in running}
         in_turn = sorted(remaining, key=lambda cell: cell not in taken)  # those that run are ahead of those that wait
         known = [cell for cell in in_turn if kind_of(cell) in speeds]
@@ -148,15 +159,6 @@ class ProgressDisplay:
             unknown=len(remaining) - len(known),
         )
 
-    def _read(self, cell: Cell) -> dict[str, Any] | None:
-        try:
-            found = read_json(cell.folder(self.out) / PROGRESS_FILE)
-            for name in ("updated", "env_steps", "steps", "steps_per_second"):
-                json_number(found, name)
-            return dict(found) if found["updated"] >= self._since else None
-        except (OSError, UnusableFile, ValueError, KeyError, TypeError, AttributeError):
-            return None
-
     def _poll(self) -> None:
         next_line = time.monotonic() + LINE_SECONDS
         while not self._stop.wait(POLL_SECONDS):
@@ -164,7 +166,9 @@ class ProgressDisplay:
                 self._live.update(progress_table(self.snapshot()), refresh=True)
             elif time.monotonic() >= next_line:
                 next_line += LINE_SECONDS
-                self.say(self.snapshot().line())
+                snapshot = self.snapshot()
+                if not tell(self.console, "progress", **snapshot.to_json()):
+                    self.say(snapshot.line())
 
 
 def progress_table(snapshot: Snapshot) -> Table:

@@ -8,24 +8,26 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from rich.console import Console
 
 from codesign_bench.cell.cell import Cell, ResolvedCell
 from codesign_bench.config.run_settings import OVERSHOOT
-from codesign_bench.console import Log, print_table, printer
+from codesign_bench.console import JsonLines, Log, print_table, printer, tell
 from codesign_bench.errors import UserError
 from codesign_bench.machine import available_cores
 from codesign_bench.startup import IMPORTS_VARIABLE
-from codesign_bench.storage.layout import CURVE_FILE, open_folder, refuse_other_files, sweep_leftovers
+from codesign_bench.storage.layout import CURVE_COLUMNS, CURVE_FILE, open_folder, refuse_other_files, sweep_leftovers
 from codesign_bench.storage.locks import HOLDER_FILE, has_locks, is_locked
 from codesign_bench.storage.records import FAILED, INTERRUPTED
 from codesign_bench.sweep.backends import Backend, ClusterLost, WorkersDied, make_backend
-from codesign_bench.sweep.estimate import estimate, fitting, known_paces, row, untimed
+from codesign_bench.sweep.estimate import estimate, event_of, fitting, known_paces, row, untimed
 from codesign_bench.sweep.pace import Kind, NotTimed, Pace, measure, remember
 from codesign_bench.sweep.plan import Plan, make_plan
 from codesign_bench.sweep.progress import ProgressDisplay
+from codesign_bench.sweep.tensorboard import Follower, check_tensorboard
 from codesign_bench.sweep.workers import BUSY, Job, Outcome
 
 EXIT_ALL_DONE, EXIT_SOME_FAILED = 0, 1
@@ -41,6 +43,10 @@ class Trouble:
     failed: dict[Cell, str]
     interrupted: dict[Cell, str]
     """Cells that the same command resumes."""
+
+    def by_status(self) -> dict[str, dict[Cell, str]]:
+        """Return status -> the cells that ended with it, with the reasons."""
+        return {FAILED: self.failed, INTERRUPTED: self.interrupted}
 
 
 def split_cores(cores: int, cells: int, threads: int, jobs: int | None, fit: int | None = None) -> tuple[int, str]:
@@ -76,14 +82,19 @@ def run_sweep(
     backend: str = "loky",
     scheduler: str | None = None,
     same_code: bool = False,
+    tensorboard: bool = False,
 ) -> int:
     """Run every cell that is not done in `out`; return 0 if all are done at the end, 1 if some failed.
+
+    With `tensorboard`, their curves and metrics are also written as scalars, while they run.
 
     Raises:
         UserError: bad input, found before anything runs.
         KeyboardInterrupt: the user stopped the sweep; its processes have ended, and the same call resumes it.
     """
     plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code)
+    if tensorboard:
+        check_tensorboard()
     known = known_paces(out)
     used_jobs, split = _split(cells, plan, jobs, known)
     chosen = make_backend(backend, used_jobs, scheduler)
@@ -93,15 +104,23 @@ def run_sweep(
         _begin(say, len(cells), plan, out)
         if workers is not None:
             say(f"running {len(plan.pending)}: {split if scheduler is None else f'on the Dask cluster {scheduler}'}")
+            expected = estimate(plan.pending, used_jobs, known)
             if scheduler is None:  # the machines of a cluster may be of any speed
-                say(estimate(plan.pending, used_jobs, known).line())
+                say(expected.line())
+            tell(
+                console, "begin", cells=len(cells), done=len(plan.done), to_run=len(plan.pending), **expected.to_json()
+            )
             say(f"cells finish their last episodes: at most {OVERSHOOT:.0%} over the budget, or one smallest batch")
             imported = os.environ.get(IMPORTS_VARIABLE, "")
             queue = [Job(pending.cell, str(out), retry_failed, imported, same_code) for pending in plan.pending]
             budgets = {pending.cell: pending.resolved.config.run.steps for pending in plan.pending}
-            with ProgressDisplay(console, out, budgets, used_jobs) as display:
+            followed = Follower(list(budgets), out) if tensorboard else nullcontext()
+            with followed, ProgressDisplay(console, out, budgets, used_jobs) as display:
                 _run_queue(queue, workers, display, trouble)
-    return _conclude(say, len(cells), trouble, plan)
+    code = _conclude(say, len(cells), trouble, plan)
+    named = {status: [cell.name for cell in given] for status, given in trouble.by_status().items()}
+    tell(console, "end", exit_code=code, cells=len(cells), **named)
+    return code
 
 
 def dry_run(
@@ -112,10 +131,12 @@ def dry_run(
     jobs: int | None = None,
     retry_failed: bool = False,
     same_code: bool = False,
+    most_timed: int | None = None,
 ) -> int:
     """Print what `run_sweep` would do with every cell, and how long it would take; return 0.
 
-    Kinds of cells that have not been timed on this machine are, for some seconds each, outside of `out`.
+    Kinds of cells that have not been timed on this machine are, for some seconds each, outside of `out`; only the first
+    `most_timed` of them if that is not None. Cells may start from others among `cells`, as in stages that follow.
 
     Raises:
         UserError: the same that `run_sweep` raises before anything runs.
@@ -125,9 +146,10 @@ def dry_run(
             refuse_other_files(out)
         except OSError as error:
             raise UserError(f"--out {out}: not readable ({error.strerror})") from error
-    plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code)
+    together = {cell.cell.name for cell in cells}
+    plan = make_plan(cells, out, retry_failed=retry_failed, same_code=same_code, promised=together)
     say, known = printer(console), known_paces(out)
-    for kind, pending in untimed(plan.pending, known).items():
+    for kind, pending in list(untimed(plan.pending, known).items())[:most_timed]:
         say(f"timing {pending.cell.task}/{pending.cell.method} ...")
         try:
             known[kind] = measure(pending.resolved)[0]
@@ -142,9 +164,18 @@ def dry_run(
         **dict.fromkeys(plan.unusable, "cannot be used"),
         **dict.fromkeys(plan.unreadable, "cannot be read"),
     }
-    to_run = {each.pending.cell: row(each) for each in expected.cells}
-    rows = [to_run.get(cell.cell) or (cell.cell.name, settled[cell.cell], "", "", "", "") for cell in cells]
-    print_table(console, ("cell", "state", "steps", "time", "memory", "known from"), rows)
+    to_run = {each.pending.cell: each for each in expected.cells}
+    if isinstance(console, JsonLines):
+        for cell in (resolved.cell for resolved in cells):
+            known_of = event_of(to_run[cell]) if cell in to_run else {"cell": cell.name, "state": settled[cell]}
+            tell(console, "planned", **known_of)
+        tell(console, "plan", **_counts(cells, plan), **expected.to_json())
+    else:
+        rows = [
+            row(to_run[cell.cell]) if cell.cell in to_run else (cell.cell.name, settled[cell.cell], "", "", "", "")
+            for cell in cells
+        ]
+        print_table(console, ("cell", "state", "steps", "time", "memory", "known from"), rows)
     for note in plan.notes:
         say(note)
     say(f"{len(cells)} cells, {len(plan.pending)} to run{f': {split}' if plan.pending else ''}")
@@ -158,6 +189,10 @@ def _split(cells: Sequence[ResolvedCell], plan: Plan, jobs: int | None, known: M
     """Return how many of the pending cells run at a time, and a message on it."""
     threads = max((resolved.config.run.threads for resolved in cells), default=1)
     return split_cores(available_cores(), len(plan.pending), threads, jobs, fitting(plan.pending, known))
+
+
+def _counts(cells: Sequence[ResolvedCell], plan: Plan) -> dict[str, int]:
+    return {"cells": len(cells), "done": len(plan.done), "to_run": len(plan.pending)}
 
 
 def _begin(say: Log, cells: int, plan: Plan, out: Path) -> None:
@@ -209,6 +244,11 @@ def _holders(queue: Sequence[Job]) -> str:
 
 def _tell(outcome: Outcome, display: ProgressDisplay, trouble: Trouble) -> None:
     display.ended(outcome.cell)
+    if isinstance(display.console, JsonLines):
+        last = _last_values(outcome.cell, display.out)
+        display.console.event(
+            "cell", {"cell": outcome.cell.name, "status": outcome.status, "message": _one_line(outcome.message), **last}
+        )
     if outcome.status == FAILED:
         trouble.failed[outcome.cell] = outcome.message
         display.say(f"failed  {outcome.cell.name}  {_one_line(outcome.message)}")
@@ -219,6 +259,15 @@ def _tell(outcome: Outcome, display: ProgressDisplay, trouble: Trouble) -> None:
         display.say(
             f"done    {outcome.cell.name}  {_last_row(outcome.cell, display.out, display.budgets[outcome.cell])}"
         )
+
+
+def _last_values(cell: Cell, out: Path) -> dict[str, Any]:
+    """Return the last row of a cell's curve, for programs; nothing if it cannot be read."""
+    try:
+        last = pd.read_csv(cell.folder(out) / CURVE_FILE).iloc[-1]
+        return {name: last[name] for name in CURVE_COLUMNS}
+    except (OSError, ValueError, LookupError, TypeError):
+        return {}
 
 
 def _last_row(cell: Cell, out: Path, budget: int) -> str:

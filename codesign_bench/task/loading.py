@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from codesign_bench.console import Log, silent
-from codesign_bench.errors import UserError
+from codesign_bench.errors import UnavailableError, UserError
 from codesign_bench.registry import load, names, usable
 from codesign_bench.task.robot import DeploymentSpec
 from codesign_bench.task.task import Task
@@ -37,12 +37,14 @@ def deployment_of(task: Task) -> DeploymentSpec:
     return task.deployment
 
 
-def load_task(name: str) -> Task:
-    """Return the task `name`.
+def load_task(name: str, *, plays: bool = True) -> Task:
+    """Return the task `name`; with `plays=False` also one that can be described in this Python, but not played.
 
     Raises:
         UserError: there is no such task.
         UnavailableError: it cannot be used in this Python.
     """
     task: Task = load("tasks", name, Task)()
+    if plays and task.missing:
+        raise UnavailableError(task.missing, f"task '{name}'")
     return task

@@ -43,6 +43,8 @@ class Task(ABC):
     """The task's name in figures."""
     version: ClassVar[int] = 1
     """Raised whenever results can no longer be compared with earlier ones: another scene, reward or instances."""
+    missing: ClassVar[str] = ""
+    """Why it can be described in this Python, but not played, e.g. for want of a package; empty: it can be played."""
     horizon: ClassVar[int]
     """Control steps until the time limit."""
     control_period: ClassVar[float]

@@ -52,6 +52,16 @@ def settings_of(tuning: Tuning, task: str, method: str, profile: str) -> list[Se
     return [Setting(task, method, number, values) for number, values in enumerate(drawn)]
 
 
+def budgets_of(tuning: Tuning, task: str, profile: str, steps: int | None) -> list[int]:
+    """Return the budget of a cell in each rung on a task; the last one is that of the profile, or `steps`.
+
+    Raises:
+        UserError: an unknown name.
+    """
+    (full,) = {resolve(load_method(method), task, profile, (), steps).run.steps for method in tuning.methods}
+    return tuning.budgets(full)
+
+
 def cells_in_turn(cells: Iterable[list[Cell]]) -> list[Cell]:
     """Return the cells of several settings, ordered so that an unfinished rung has about as many of each method."""
     everything = [cell for of_setting in cells for cell in of_setting]

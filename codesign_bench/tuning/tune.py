@@ -11,17 +11,17 @@ from pathlib import Path
 from rich.console import Console
 
 from codesign_bench.cell.cell import resolve_cells
-from codesign_bench.config.resolve import resolve
-from codesign_bench.console import Log, print_table, printer
+from codesign_bench.console import Log, printer
 from codesign_bench.errors import UserError
-from codesign_bench.method import load_method, usable_methods
+from codesign_bench.method import usable_methods
 from codesign_bench.study.study import Study
 from codesign_bench.study.tuning import FIRST_REPORTED_SEED, Tuning
 from codesign_bench.sweep.runner import EXIT_ALL_DONE, run_sweep
 from codesign_bench.task import usable_tasks
+from codesign_bench.tuning.expected import expected, print_plan
 from codesign_bench.tuning.results import TABLE_FILE, WINNERS_FILE, check_tables, spent, write_table, write_winners
 from codesign_bench.tuning.scores import Score, score, survivors
-from codesign_bench.tuning.settings import cells_in_turn, settings_of
+from codesign_bench.tuning.settings import budgets_of, cells_in_turn, settings_of
 
 
 def tuning_of(study: Study) -> Tuning:
@@ -66,30 +66,6 @@ def usable_part(tuning: Tuning, log: Log) -> Tuning:
     return replace(tuning, tasks=tuple(tasks), methods=tuple(methods))
 
 
-def print_plan(console: Console, tuning: Tuning, profile: str, steps: int | None) -> None:
-    """Print the rungs of the search on every task, the same for every method, and the steps of each method."""
-    budgets = {task: budgets_of(tuning, task, profile, steps) for task in tuning.tasks}
-    rows = [
-        (task, str(rung), str(size), f"{budget:,}", f"{size * budget * len(tuning.seeds):,}")
-        for task in tuning.tasks
-        for rung, (size, budget) in enumerate(zip(tuning.sizes, budgets[task], strict=True))
-    ]
-    log = printer(console)
-    print_table(console, ("task", "rung", "settings", "steps of a cell", "steps of a method"), rows)
-    each = sum(tuning.steps(budgets[task][-1]) for task in tuning.tasks)
-    log(f"the same for {', '.join(tuning.methods)}: {each:,} steps each, {each * len(tuning.methods):,} in all")
-
-
-def budgets_of(tuning: Tuning, task: str, profile: str, steps: int | None) -> list[int]:
-    """Return the budget of a cell in each rung on a task; the last one is that of the profile, or `steps`.
-
-    Raises:
-        UserError: an unknown name.
-    """
-    (full,) = {resolve(load_method(method), task, profile, (), steps).run.steps for method in tuning.methods}
-    return tuning.budgets(full)
-
-
 def tune(
     study: str,
     tuning: Tuning,
@@ -103,6 +79,7 @@ def tune(
     backend: str = "loky",
     scheduler: str | None = None,
     same_code: bool = False,
+    tensorboard: bool = False,
 ) -> int:
     """Run the missing cells of a study's search and write its files; return 0, or 1 if some cell failed.
 
@@ -125,6 +102,7 @@ def tune(
         backend=backend,
         scheduler=scheduler,
         same_code=same_code,
+        tensorboard=tensorboard,
     )
     alive = [
         setting
@@ -133,6 +111,7 @@ def tune(
     ]
     scores, kept, winners = list[Score](), list[Score](), list[Score]()
     print_plan(console, tuning, profile, steps)
+    log(expected(tuning, profile, steps, out, jobs).line())
     for rung, following in enumerate([*tuning.sizes[1:], 1]):
         log(f"rung {rung + 1} of {tuning.rungs}")
         cells = [setting.cells(tuning, rung, profile, budgets[setting.task][rung]) for setting in alive]

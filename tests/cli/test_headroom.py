@@ -62,6 +62,19 @@ def test_episodes_are_renewed_and_reference_points_with_them(
     assert "stored episodes" in str(renewed["source"])
 
 
+def test_a_dry_run_says_how_much_would_be_played_and_plays_nothing(
+    cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results = tmp_path / "runs"
+    line = ["headroom", "--policy", str(cell), "--update", "--results", str(results), *SMALL, "--random-tools", "2"]
+    assert main([*line, "--dry-run"]) == 0
+    of_cell, of_task, last = capsys.readouterr().out.splitlines()
+    assert of_cell.startswith(f"{cell}: at most {8 * (8 + 2 + 12)} episodes, ")
+    assert of_task.startswith(f"toy_reach: at most {8 * (2 + 4) + 8 * (1 + 7 + 12 + 2)} episodes, ")
+    assert last == "nothing was played"
+    assert not results.exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [

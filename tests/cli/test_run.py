@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -62,6 +63,38 @@ def test_a_dry_run_lists_every_cell_and_leaves_everything_as_it_is(
     assert "timing" not in second
     assert "2 cells, 1 to run: 1 at a time with 1 thread each" in second
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def events(text: str) -> list[dict[str, Any]]:
+    """Return the events that a command with --json printed; every line must be one."""
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def test_a_program_can_follow_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    line = [*RUN, "--seeds", "2", "--out", str(tmp_path / "runs"), "--json"]
+    assert main([*line, "--dry-run"]) == 0
+    told = events(capsys.readouterr().out)
+    planned = [(event["cell"], event["state"]) for event in told if event["event"] == "planned"]
+    assert planned == [(f"toy_reach/toy_search/default/seed-0{seed}", "run") for seed in range(2)]
+    (plan,) = [event for event in told if event["event"] == "plan"]
+    assert (plan["cells"], plan["to_run"], plan["steps"]) == (2, 2, 200)
+    assert plan["expected_seconds"] > 0.0
+    assert main(line) == 0
+    told = events(capsys.readouterr().out)
+    assert [event["to_run"] for event in told if event["event"] == "begin"] == [2]
+    ended = [event for event in told if event["event"] == "cell"]
+    assert [(event["status"], event["env_steps"] >= 100) for event in ended] == [("done", True)] * 2
+    assert told[-1] | {"time": ""} == {
+        "event": "end",
+        "time": "",
+        "exit_code": 0,
+        "cells": 2,
+        "failed": [],
+        "interrupted": [],
+    }
 
 
 def test_a_dry_run_says_what_cannot_be_timed_and_lists_the_rest(

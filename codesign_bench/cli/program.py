@@ -33,6 +33,7 @@ LONGEST_LINE = 1_000
 COMMANDS = (
     "list",
     "show",
+    "check",
     "run",
     "tune",
     "status",

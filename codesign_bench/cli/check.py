@@ -22,11 +22,11 @@ PASSED, LEFT_OUT, WRONG = "passed", "left out", "wrong"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what to check, and the task on which methods are tried."""
+    """Add what to check, and the task on which methods are examined."""
     parser.add_argument("--task", nargs="+", default=[], metavar="T", help="names that `list` shows, or all")
     parser.add_argument("--method", nargs="+", default=[], metavar="M", help="names that `list` shows, all or beyond")
     parser.add_argument(
-        "--on", metavar="T", help="task on which methods are tried; default: the first that `list` shows"
+        "--on", metavar="T", help="task on which methods are examined; default: the first that `list` shows"
     )
 
 
@@ -38,7 +38,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if not options.task and not options.method:
         raise UserError("check: give --task or --method")
     if options.on and not options.method:
-        raise UserError("check: --on is the task on which methods are tried; give --method, too")
+        raise UserError("check: --on is the task on which methods are examined; give --method, too")
     log = printer(console)
     examined: list[tuple[str, Callable[[], Iterator[Verdict]]]] = []
     if options.task:

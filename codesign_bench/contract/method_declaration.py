@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from codesign_bench.config.profiles import profiles
 from codesign_bench.config.resolve import resolve
 from codesign_bench.contract.check import Fault, counted, described, promised, undefined
-from codesign_bench.contract.trial import Trial
+from codesign_bench.contract.subject import Subject
 from codesign_bench.errors import UnavailableError, UserError
 from codesign_bench.method import Method, load_method, method_names, usable_methods
 from codesign_bench.task import task_names, usable_tasks
@@ -41,9 +41,9 @@ def loads(name: str) -> Iterator[Fault]:
 
 
 @promised("Its hyperparameters are a frozen dataclass with a default for each.", f"{METHOD}.config_class", first=True)
-def hyperparameters_have_defaults(trial: Trial) -> Iterator[Fault]:
+def hyperparameters_have_defaults(subject: Subject) -> Iterator[Fault]:
     """Yield what is missing."""
-    config = trial.method_class.config_class
+    config = subject.method_class.config_class
     if not dataclasses.is_dataclass(config) or not config.__dataclass_params__.frozen:  # type: ignore[attr-defined]
         yield Fault(f"`config_class` is {config.__name__}", "a class with @dataclass(frozen=True)")
         return
@@ -51,24 +51,24 @@ def hyperparameters_have_defaults(trial: Trial) -> Iterator[Fault]:
     bare = [field.name for field in dataclasses.fields(config) if field.default is field.default_factory is missing]
     if bare:
         yield Fault(f"no default: {counted(bare)}", "a default for every hyperparameter, which works on any task")
-    if unknown := sorted(set(trial.method_class.small()) - {field.name for field in dataclasses.fields(config)}):
+    if unknown := sorted(set(subject.method_class.small()) - {field.name for field in dataclasses.fields(config)}):
         yield Fault(f"`small` sets {', '.join(unknown)}", f"fields of {config.__name__}")
 
 
 @promised("No other method has its label.", f"{METHOD}.label")
-def label_is_its_own(trial: Trial) -> Iterator[Fault]:
+def label_is_its_own(subject: Subject) -> Iterator[Fault]:
     """Yield the methods with the same label."""
     labels = {name: load_method(name).label for name in usable_methods(method_names())}
-    own = trial.method_class
+    own = subject.method_class
     same = [name for name, label in labels.items() if label == own.label and name != own.name]
     if same:
         yield Fault(f"'{own.label}' is the label of {', '.join(same)}, too", "a label of its own for figures")
 
 
 @promised("Every profile makes a valid configuration for every task.", f"{METHOD}.profile")
-def profiles_are_valid(trial: Trial) -> Iterator[Fault]:
+def profiles_are_valid(subject: Subject) -> Iterator[Fault]:
     """Yield profiles that set what is no hyperparameter, or a value that does not fit."""
-    method_class = trial.method_class
+    method_class = subject.method_class
     fields = {field.name for field in dataclasses.fields(method_class.config_class)}
     for profile in profiles():
         for task_name in usable_tasks(task_names()):

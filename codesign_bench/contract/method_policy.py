@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from codesign_bench.contract.check import DoesWithoutError, Fault, counted, promised
-from codesign_bench.contract.trial import BUDGET, Trial, unlike
+from codesign_bench.contract.subject import BUDGET, Subject, unlike
 from codesign_bench.errors import UserError
 from codesign_bench.method import Method, Policy
 
@@ -23,14 +23,14 @@ ROUNDING = 1e-3
 
 
 @promised("Actions are finite, inside of [-1, 1], and alike for one observation and for many.", POLICY)
-def actions_are_in_bounds(trial: Trial) -> Iterator[Fault]:
+def actions_are_in_bounds(subject: Subject) -> Iterator[Fault]:
     """Yield where they are not."""
-    yield from unlike_alone(trial, trial.trained().policy(), ROUNDING)
+    yield from unlike_alone(subject, subject.trained().policy(), ROUNDING)
 
 
-def unlike_alone(trial: Trial, policy: Policy, tolerance: float) -> Iterator[Fault]:
+def unlike_alone(subject: Subject, policy: Policy, tolerance: float) -> Iterator[Fault]:
     """Yield actions that are out of bounds, or differ by more than a tolerance when asked for one by one."""
-    for phase, choose, seen, size in trial.phases(policy):
+    for phase, choose, seen, size in subject.phases(policy):
         batched = choose(seen)
         if batched.shape != (len(seen), size) or batched.dtype != np.float32:
             yield Fault(
@@ -51,38 +51,38 @@ def unlike_alone(trial: Trial, policy: Policy, tolerance: float) -> Iterator[Fau
 
 
 @promised("It designs a tool per goal where it says so, and one for all goals elsewhere.", f"{METHOD}.tool_per_goal")
-def tools_are_per_goal_if_it_says_so(trial: Trial) -> Iterator[Fault]:
+def tools_are_per_goal_if_it_says_so(subject: Subject) -> Iterator[Fault]:
     """Yield what it does instead."""
-    method = trial.make()
+    method = subject.make()
     # Some begin with one tool for all, and some search for a while before they choose.
     for _ in range(PATIENCE if method.tool_per_goal else 2):
         method.train(BUDGET)
-        tools = np.unique(method.policy().design(trial.observations()[0]), axis=0)
+        tools = np.unique(method.policy().design(subject.observations()[0]), axis=0)
         if len(tools) > 1:
             break
     if (len(tools) > 1) != method.tool_per_goal:
         yield Fault(
-            f"{len(tools)} different tools for {len(trial.observations()[0])} goals, and `tool_per_goal` is "
+            f"{len(tools)} different tools for {len(subject.observations()[0])} goals, and `tool_per_goal` is "
             f"{method.tool_per_goal}",
             "tool_per_goal = False for a method that makes one tool for all goals, else several tools",
         )
 
 
 @promised("A policy that is made from its tensors acts like the first.", f"{METHOD}.make_policy")
-def tensors_are_all_of_a_policy(trial: Trial) -> Iterator[Fault]:
+def tensors_are_all_of_a_policy(subject: Subject) -> Iterator[Fault]:
     """Yield where it does not."""
-    method = trial.trained()
+    method = subject.trained()
     policy = method.policy()
-    copy = type(method).make_policy(trial.task, method.config, policy.tensors())
-    yield from trial.acting_unlike(policy, copy, "the policy from `tensors`")
+    copy = type(method).make_policy(subject.task, method.config, policy.tensors())
+    yield from subject.acting_unlike(policy, copy, "the policy from `tensors`")
     if differing := unlike(policy.tensors(), copy.tensors()):
         yield Fault(f"its `tensors` are others: {counted(differing)}", "the arrays that it was made from")
 
 
 @promised("Tensors that were asked for do not change when training goes on.", f"{POLICY}.tensors")
-def tensors_are_copies(trial: Trial) -> Iterator[Fault]:
+def tensors_are_copies(subject: Subject) -> Iterator[Fault]:
     """Yield those that do."""
-    method = trial.trained()
+    method = subject.trained()
     tensors = method.policy().tensors()
     kept = {name: tensor.copy() for name, tensor in tensors.items()}
     method.train(BUDGET)
@@ -91,23 +91,23 @@ def tensors_are_copies(trial: Trial) -> Iterator[Fault]:
 
 
 @promised("A policy can be sent to another process, by pickle.", f"{METHOD}.policy")
-def policies_can_be_sent(trial: Trial) -> Iterator[Fault]:
+def policies_can_be_sent(subject: Subject) -> Iterator[Fault]:
     """Yield why it cannot, or what it becomes on the way."""
-    policy = trial.trained().policy()
+    policy = subject.trained().policy()
     try:
         copy = pickle.loads(pickle.dumps(policy))
     except Exception as error:
         yield Fault(f"pickling it raised {type(error).__name__}: {error}", "no error: evaluation uses several cores")
         return
-    yield from trial.acting_unlike(policy, copy, "the policy that arrives")
+    yield from subject.acting_unlike(policy, copy, "the policy that arrives")
 
 
 @promised("It takes over a trained policy, or says that it cannot.", f"{METHOD}.start_from")
-def trained_policies_are_taken_over(trial: Trial) -> Iterator[Fault]:
+def trained_policies_are_taken_over(subject: Subject) -> Iterator[Fault]:
     """Yield what is left of its own start."""
-    donor, heir = trial.make(), trial.make(seed=1)
+    donor, heir = subject.make(), subject.make(seed=1)
     tensors = donor.policy().tensors()
-    if trial.method_class.start_from is Method.start_from:
+    if subject.method_class.start_from is Method.start_from:
         raise DoesWithoutError("it cannot start from a trained policy")
     try:
         heir.start_from(tensors)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from codesign_bench.contract.check import Fault, counted, promised
-from codesign_bench.contract.trial import BUDGET, Trial, differing_state
+from codesign_bench.contract.subject import BUDGET, Subject, differing_state
 from codesign_bench.storage.checkpoint import Checkpoint, Progress, load_checkpoint, save_checkpoint
 
 BATCHES = 2
@@ -16,9 +16,9 @@ STATE = "codesign_bench.method.Method.state"
 
 
 @promised("An interrupted method resumes from its checkpoint to the last bit.", STATE)
-def resumes_to_the_bit(trial: Trial) -> Iterator[Fault]:
+def resumes_to_the_bit(subject: Subject) -> Iterator[Fault]:
     """Yield what is lost on the way through a checkpoint."""
-    method, left = trial.make(), BUDGET
+    method, left = subject.make(), BUDGET
     for _ in range(BATCHES):
         left -= method.train(left).env_steps
     state = method.state()
@@ -33,11 +33,11 @@ def resumes_to_the_bit(trial: Trial) -> Iterator[Fault]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "checkpoint"
         save_checkpoint(path, Checkpoint(state, method.streams.state(), Progress()))
-        restored, checkpoint = trial.make(), load_checkpoint(path)
+        restored, checkpoint = subject.make(), load_checkpoint(path)
     assert checkpoint is not None
     restored.load_state(checkpoint.state)
     restored.streams.load_state(checkpoint.streams)
-    yield from trial.acting_unlike(method.policy(), restored.policy(), "the policy of the resumed method")
+    yield from subject.acting_unlike(method.policy(), restored.policy(), "the policy of the resumed method")
     for batch in range(BATCHES):
         report, again = method.train(left), restored.train(left)
         if report != again:

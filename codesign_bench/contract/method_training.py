@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from codesign_bench.contract.check import Fault, promised
-from codesign_bench.contract.trial import BUDGET, CountingTask, Trial, differing_state, unlike
+from codesign_bench.contract.subject import BUDGET, CountingTask, Subject, differing_state, unlike
 
 METHOD = "codesign_bench.method.Method"
 PATIENCE = 20
@@ -17,9 +17,9 @@ PATIENCE = 20
 
 
 @promised("Training changes the policy, and what it reports is finite.", f"{METHOD}.train", first=True)
-def training_changes_the_policy(trial: Trial) -> Iterator[Fault]:
+def training_changes_the_policy(subject: Subject) -> Iterator[Fault]:
     """Yield where it does not."""
-    method = trial.make()
+    method = subject.make()
     before = method.policy().tensors()
     for _ in range(PATIENCE):
         report = method.train(BUDGET)
@@ -40,10 +40,10 @@ def training_changes_the_policy(trial: Trial) -> Iterator[Fault]:
 
 
 @promised("Reported steps are the simulated ones, those of candidates included.", "codesign_bench.method.BatchReport")
-def every_step_counts(trial: Trial) -> Iterator[Fault]:
+def every_step_counts(subject: Subject) -> Iterator[Fault]:
     """Yield batches that report other steps than they took."""
-    counting = CountingTask(trial.task)
-    method = trial.make(task=counting.task)
+    counting = CountingTask(subject.task)
+    method = subject.make(task=counting.task)
     for batch in range(2):
         before = counting.env_steps
         reported, simulated = method.train(BUDGET).env_steps, counting.env_steps - before
@@ -55,9 +55,9 @@ def every_step_counts(trial: Trial) -> Iterator[Fault]:
 
 
 @promised("The last batch of a small budget is small.", f"{METHOD}.train")
-def last_batch_is_small(trial: Trial) -> Iterator[Fault]:
+def last_batch_is_small(subject: Subject) -> Iterator[Fault]:
     """Yield how much longer it is."""
-    method = trial.make()
+    method = subject.make()
     steps = method.train(1).env_steps
     if not 1 <= steps <= method.shortest_batch:
         yield Fault(
@@ -67,9 +67,9 @@ def last_batch_is_small(trial: Trial) -> Iterator[Fault]:
 
 
 @promised("The seed decides all numbers.", "codesign_bench.seeding.Streams")
-def seed_decides(trial: Trial) -> Iterator[Fault]:
+def seed_decides(subject: Subject) -> Iterator[Fault]:
     """Yield what the same seed changes, or another does not."""
-    first, again, other = trial.make(), trial.make(), trial.make(seed=1)
+    first, again, other = subject.make(), subject.make(), subject.make(seed=1)
     for batch in range(2):
         reports = first.train(BUDGET), again.train(BUDGET)
         if reports[0] != reports[1]:
@@ -82,10 +82,10 @@ def seed_decides(trial: Trial) -> Iterator[Fault]:
 
 
 @promised("It touches no global generator.", "codesign_bench.seeding.Streams")
-def global_generators_are_left_alone(trial: Trial) -> Iterator[Fault]:
+def global_generators_are_left_alone(subject: Subject) -> Iterator[Fault]:
     """Yield the generators that were drawn from or seeded."""
     before = _global_states()
-    method = trial.trained()
+    method = subject.trained()
     type(method).make_policy(method.problem.task, method.config, method.policy().tensors())
     for name, state in _global_states().items():
         if state != before[name]:

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 from codesign_bench.contract import method_declaration, method_policy, method_resuming, method_training
 from codesign_bench.contract.check import Check, Verdict, ask, examine
-from codesign_bench.contract.trial import Trial
+from codesign_bench.contract.subject import Subject
 from codesign_bench.method import load_method
 from codesign_bench.task import Task
 
 LOADS: Check[str] = method_declaration.loads
-METHOD_CHECKS: tuple[Check[Trial], ...] = (
+METHOD_CHECKS: tuple[Check[Subject], ...] = (
     method_declaration.hyperparameters_have_defaults,
     method_declaration.label_is_its_own,
     method_declaration.profiles_are_valid,
@@ -32,7 +32,7 @@ METHOD_CHECKS: tuple[Check[Trial], ...] = (
 
 
 def examine_method(name: str, task: Task) -> Iterator[Verdict]:
-    """Yield the verdict of each check on the method of this name, tried on a task, as soon as it is known.
+    """Yield the verdict of each check on the method of this name, examined on a task, as soon as it is known.
 
     Raises:
         UserError: there is no such method.
@@ -42,4 +42,4 @@ def examine_method(name: str, task: Task) -> Iterator[Verdict]:
     yield verdict
     if not verdict.faults:
         method_class = load_method(name)
-        yield from examine(METHOD_CHECKS, Trial(method_class, task), method_class)
+        yield from examine(METHOD_CHECKS, Subject(method_class, task), method_class)

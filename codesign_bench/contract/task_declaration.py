@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import fields
 from itertools import product
 
 import numpy as np
@@ -59,11 +58,9 @@ def loads(name: str) -> Iterator[Fault]:
 def spaces_fit(task: Task) -> Iterator[Fault]:
     """Yield what does not fit."""
     for name, box in spaces(task).items():
-        for entry, low, high, unit in zip(*(getattr(box, field.name) for field in fields(Box)), strict=True):
+        for entry, low, high in zip(box.names, box.low, box.high, strict=True):
             if not (np.isfinite([low, high]).all() and low < high):
                 yield Fault(f"{name}: {entry} ranges from {low} to {high}", "two finite ends, the lower one first")
-            if not unit:
-                yield Fault(f"{name}: {entry} has no unit", 'a unit such as "m", or "1" for a plain number')
     if not 0 <= task.goal_size <= task.instance_space.size:
         yield Fault(
             f"goal_size is {task.goal_size}, and an instance has {task.instance_space.size} entries",

@@ -23,8 +23,8 @@ OBSERVATIONS = 6
 
 
 @dataclass(frozen=True)
-class Trial:
-    """A method's class, and the task on which it is tried."""
+class Subject:
+    """A method's class, and the task on which it is examined."""
 
     method_class: type[Method[Any]]
     task: Task

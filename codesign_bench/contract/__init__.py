@@ -4,8 +4,9 @@
 `methods.py` all of them in order. The command `check` and the tests of every member ask the same checks.
 """
 
-from codesign_bench.contract.check import Check, DoesWithoutError, Fault, Verdict, examine, promised
+from codesign_bench.contract.check import Check, DoesWithoutError, Fault, Verdict, ask, examine, promised
 from codesign_bench.contract.methods import METHOD_CHECKS, examine_method
+from codesign_bench.contract.subject import Subject
 from codesign_bench.contract.tasks import TASK_CHECKS, examine_task
 
 __all__ = [
@@ -14,7 +15,9 @@ __all__ = [
     "Check",
     "DoesWithoutError",
     "Fault",
+    "Subject",
     "Verdict",
+    "ask",
     "examine",
     "examine_method",
     "examine_task",

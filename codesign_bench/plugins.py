@@ -52,8 +52,10 @@ def _imported(name: str) -> ModuleType:
 def _register_members(module: ModuleType) -> None:
     """Register the tasks, the methods, the study and the figure that a module defines (not those it imports)."""
     for member in vars(module).values():
-        if not inspect.isclass(member) or inspect.isabstract(member) or member.__module__ != module.__name__:
+        if not inspect.isclass(member) or member.__module__ != module.__name__:
             continue
+        if inspect.isabstract(member) and "name" not in vars(member):
+            continue  # a base of members; a class with a name is a member, and it is told what it lacks
         for group, base in (("tasks", Task), ("methods", Method)):
             if issubclass(member, base):
                 register(group, member.name, lambda member=member: member)  # type: ignore[misc]

@@ -51,6 +51,7 @@ TESTED_ELSEWHERE = {
 
 OF_NO_MODULE = {
     "tests/claims/test_a_a.py": "of all rules that compare methods",
+    "tests/docs/test_contributing.py": "of what CONTRIBUTING.md writes out",
     "tests/docs/test_make_task_pages.py": "of the script docs/make_task_pages.py",
     "tests/docs/test_pages.py": "of the documentation",
     "tests/learning/test_pendulum.py": "of the whole learner, beside another library's",

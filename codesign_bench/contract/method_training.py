@@ -97,10 +97,9 @@ def global_generators_are_left_alone(subject: Subject) -> Iterator[Fault]:
 
 
 def _global_states() -> dict[str, bytes]:
-    keys = np.asarray(np.random.get_state()[1])  # noqa: NPY002  # The point: nobody draws from it.
-    place = repr(np.random.get_state()[2:]).encode()  # noqa: NPY002
+    _, keys, *place = np.random.get_state(legacy=True)  # noqa: NPY002  # The point: nobody draws from it.
     return {
-        "numpy": keys.tobytes() + place,
+        "numpy": np.asarray(keys).tobytes() + repr(place).encode(),
         "torch": torch.get_rng_state().numpy().tobytes(),
         "random": repr(random.getstate()).encode(),
     }

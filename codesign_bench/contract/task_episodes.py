@@ -118,8 +118,8 @@ def designs_and_controls_matter(task: Task) -> Iterator[Fault]:
         ("controls", Script(script.instances, script.designs, -script.controls)),
     ):
         after = record(Episodes(task, EPISODES), change, slots)
-        states = (played.observation[:, :, task.layout.state] for played in (before, after))
-        if np.array_equal(*states) and np.array_equal(before.reward, after.reward):
+        first, second = (played.observation[:, :, task.layout.state] for played in (before, after))
+        if np.array_equal(first, second) and np.array_equal(before.reward, after.reward):
             yield Fault(f"opposite {what} changed no state and no reward", "that they change something")
 
 

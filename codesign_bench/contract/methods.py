@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from codesign_bench.contract import method_declaration, method_policy, method_resuming, method_training
+import codesign_bench.contract.method_declaration as method_declaration
+import codesign_bench.contract.method_policy as method_policy
+import codesign_bench.contract.method_resuming as method_resuming
+import codesign_bench.contract.method_training as method_training
 from codesign_bench.contract.check import Check, Verdict, ask, examine
 from codesign_bench.contract.subject import Subject
 from codesign_bench.method import load_method

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from codesign_bench.contract import (
-    task_declaration,
-    task_episodes,
-    task_instances,
-    task_physics,
-    task_rewards,
-    task_script,
-)
+import codesign_bench.contract.task_declaration as task_declaration
+import codesign_bench.contract.task_episodes as task_episodes
+import codesign_bench.contract.task_instances as task_instances
+import codesign_bench.contract.task_physics as task_physics
+import codesign_bench.contract.task_rewards as task_rewards
+import codesign_bench.contract.task_script as task_script
 from codesign_bench.contract.check import Check, Verdict, ask, examine
 from codesign_bench.task import Task, load_task
 

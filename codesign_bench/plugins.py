@@ -51,7 +51,8 @@ def _imported(name: str) -> ModuleType:
 
 def _is_meant_as_member(member: type, base: type) -> bool:
     """Return whether a class is a member, or one that lacks methods of `base`; a base of members has abstract ones."""
-    lacks, declared = (getattr(owner, "__abstractmethods__", frozenset()) for owner in (member, base))
+    lacks: frozenset[str] = getattr(member, "__abstractmethods__", frozenset())
+    declared: frozenset[str] = getattr(base, "__abstractmethods__", frozenset())
     return not lacks or ("name" in vars(member) and lacks <= declared)
 
 

@@ -49,13 +49,20 @@ def _imported(name: str) -> ModuleType:
         raise UnavailableError(in_one_line(error), f"--import {name}") from error
 
 
+def _is_meant_as_member(member: type, base: type) -> bool:
+    """Return whether a class is a member, or one that lacks methods of `base`; a base of members has abstract ones."""
+    lacks: frozenset[str] = getattr(member, "__abstractmethods__", frozenset())
+    declared: frozenset[str] = getattr(base, "__abstractmethods__", frozenset())
+    return not lacks or ("name" in vars(member) and lacks <= declared)
+
+
 def _register_members(module: ModuleType) -> None:
     """Register the tasks, the methods, the study and the figure that a module defines (not those it imports)."""
     for member in vars(module).values():
-        if not inspect.isclass(member) or inspect.isabstract(member) or member.__module__ != module.__name__:
+        if not inspect.isclass(member) or member.__module__ != module.__name__:
             continue
         for group, base in (("tasks", Task), ("methods", Method)):
-            if issubclass(member, base):
+            if issubclass(member, base) and _is_meant_as_member(member, base):
                 register(group, member.name, lambda member=member: member)  # type: ignore[misc]
     if isinstance(getattr(module, "STUDY", None), Study):
         register("studies", module.STUDY.name, lambda: module)

@@ -94,7 +94,11 @@ class ToolAndActor(nn.Module):
 
     def policy(self) -> Policy:
         """Return the policy that builds the tool and acts with the actor's means."""
-        return NetworkPolicy(self, lambda seen: self.unit_design.expand(len(seen), -1), self.actor.control)
+        return NetworkPolicy(self, self.design, self.actor.control)
+
+    def design(self, observation: Tensor) -> Tensor:
+        """Return the tool (B, D) for observations (B, O), whatever they are."""
+        return self.unit_design.expand(len(observation), -1)
 
 
 class Coadaptation(Method[Config]):

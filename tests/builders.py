@@ -14,6 +14,7 @@ from codesign_bench.cell.cell import Cell, resolve_cells
 from codesign_bench.cell.grid import grid
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.config.settings import Sourced, StoredConfig
+from codesign_bench.contract import Verdict
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate, rows
 from codesign_bench.method import Array, load_method
@@ -44,6 +45,13 @@ def offered(part: Callable[[], Part]) -> Part:
         return part()
     except (UserError, NotImplementedError) as error:
         pytest.skip(f"does without: {error or part}")
+
+
+def assert_kept(verdict: Verdict) -> None:
+    """Assert that a member keeps a promise; skip the test where it lacks the part that the promise is about."""
+    if verdict.left_out:
+        pytest.skip(verdict.left_out)
+    assert verdict.faults == (), verdict.check.promise
 
 
 def store_cell(

@@ -52,13 +52,13 @@ TESTED_ELSEWHERE = {
 
 OF_NO_MODULE = {
     "tests/claims/test_a_a.py": "of all rules that compare methods",
+    "tests/docs/test_contributing.py": "of what CONTRIBUTING.md writes out",
     "tests/docs/test_make_task_pages.py": "of the script docs/make_task_pages.py",
     "tests/docs/test_pages.py": "of the documentation",
     "tests/learning/test_pendulum.py": "of the whole learner, beside another library's",
     "tests/learning/test_plain_update.py": "of all of an update's modules together, beside a plain one",
     "tests/methods/test_contract.py": "of every method",
     "tests/methods/test_honesty.py": "of every method: that it is what it says",
-    "tests/methods/test_start_from.py": "of every method",
     "tests/results/test_reference.py": "of the shipped results",
     "tests/results/test_ship_cells.py": "of the script results/ship_cells.py",
     "tests/results/test_submissions.py": "of the archives of the leaderboard",
@@ -68,7 +68,6 @@ OF_NO_MODULE = {
     "tests/storage/test_version_0_1_0.py": "of the whole program, on results of an earlier version",
     "tests/studies/corl2023/test_tables.py": "of several modules of data, beside the paper's tables",
     "tests/sweep/test_resume.py": "of whole sweeps that are killed",
-    "tests/tasks/_scripts/test_contract.py": "of every script",
     "tests/tasks/test_contract.py": "of every task",
     "tests/tasks/test_frozen_scenes.py": "of every task: that its scene is the one of its version",
     "tests/tasks/test_soundness.py": "of every task: that its physics are sound",

@@ -156,7 +156,7 @@ class ToySearch(Method[Config]):
         """Judge one neighbour."""
         self._misbehave()
         candidate = np.clip(self.best + self.config.step_size * self.streams["search"].normal(size=2), -1.0, 1.0)
-        earned, env_steps = self._rollout(ConstantPolicy(candidate))
+        earned, env_steps = self._rollout(ConstantPolicy(candidate), self.config.episodes)
         if earned > self.best_return:
             self.best, self.best_return = candidate, earned
         self.env_steps += env_steps
@@ -175,8 +175,7 @@ class ToySearch(Method[Config]):
         if self.config.die_at is not None and self.env_steps >= self.config.die_at:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    def _rollout(self, policy: Policy) -> tuple[float, int]:
-        count = self.config.episodes
+    def _rollout(self, policy: Policy, count: int) -> tuple[float, int]:
         slots, earned, env_steps = np.arange(count), 0.0, count
         with self.problem.episodes(count) as episodes:
             episodes.begin(slots, self.problem.sample_instances(self.streams["instances"], count))

@@ -16,8 +16,8 @@ from codesign_bench.config.resolve import split_override
 from codesign_bench.config.run_settings import Steps, Threads
 from codesign_bench.config.values import parse_value, printable, shown
 from codesign_bench.console import Log, printer, silent, tell
-from codesign_bench.errors import UserError, unknown_name
-from codesign_bench.registry import KINDS, names
+from codesign_bench.errors import UnavailableError, UserError, unknown_name
+from codesign_bench.registry import KINDS, names, usable
 from codesign_bench.storage.places import REFERENCE
 from codesign_bench.study import DEFAULT_STUDY, load_study
 from codesign_bench.visible_text import visible
@@ -285,50 +285,64 @@ def chosen_names(group: str, given: Sequence[str], meanings: Mapping[str, Sequen
     return chosen
 
 
-def chosen_tasks(given: Sequence[str], log: Log = silent) -> list[str]:
+def chosen_tasks(given: Sequence[str], log: Log = silent, sound: bool = True) -> list[str]:
     """Return the tasks that `--task` selects.
 
     What cannot be used in this Python is no part of `all`, and `log` names it; by its own name, it is refused.
+
+    Args:
+        given: words of the command line.
+        log: shows what is left out.
+        sound: whether a task whose own code is at fault raises its error; it is selected otherwise.
 
     Raises:
         UserError: an unknown name, or no name at all.
         UnavailableError: a task of this name cannot be used in this Python, or no task at all can.
     """
-    from codesign_bench.task import load_task, usable_tasks
+    from codesign_bench.task import load_task
 
     chosen = chosen_names("tasks", given, {ALL: names("tasks")})
-    return _without_unusable(chosen, _words(given), load_task, usable_tasks, log)
+    return _without_unusable(chosen, _words(given), load_task if sound else _if_available(load_task), log)
 
 
-def chosen_methods(given: Sequence[str], log: Log = silent) -> list[str]:
+def chosen_methods(given: Sequence[str], log: Log = silent, sound: bool = True) -> list[str]:
     """Return the methods that `--method` selects: `all` is those of the default study, `beyond` all others.
 
     What cannot be used in this Python is no part of a group, and `log` names it; by its own name, it is refused.
-
-    Raises:
-        UserError: an unknown name, or no name at all.
-        UnavailableError: a method of this name cannot be used in this Python, or none of them can.
+    Arguments and errors are those of `chosen_tasks`.
     """
-    from codesign_bench.method import load_method, usable_methods
+    from codesign_bench.method import load_method
 
     paper = load_study(DEFAULT_STUDY).methods
     beyond = tuple(name for name in names("methods") if name not in paper)
     chosen = chosen_names("methods", given, {ALL: paper, BEYOND: beyond})
-    return _without_unusable(chosen, _words(given), load_method, usable_methods, log)
+    return _without_unusable(chosen, _words(given), load_method if sound else _if_available(load_method), log)
 
 
-def _without_unusable(
-    chosen: list[str],
-    named: Sequence[str],
-    load: Callable[[str], object],
-    usable: Callable[[Sequence[str], Log], list[str]],
-    log: Log,
-) -> list[str]:
+def _if_available(load: Callable[[str], object]) -> Callable[[str], object]:
+    """Return a function that loads a member as `load` does, but passes over its faults.
+
+    Raises:
+        UnavailableError: the member cannot be used in this Python.
+    """
+
+    def load_one(name: str) -> object:
+        try:
+            return load(name)
+        except UnavailableError:
+            raise
+        except Exception:
+            return None
+
+    return load_one
+
+
+def _without_unusable(chosen: list[str], named: Sequence[str], load: Callable[[str], object], log: Log) -> list[str]:
     """Return the names that can be used; `load` refuses those of the others that are `named`, or one if none can."""
     for name in chosen:
         if name in named:
             load(name)
-    found = usable(chosen, log)
+    found = usable(chosen, load, log)
     if not found:
         load(chosen[0])
     return found

@@ -35,6 +35,7 @@ LONGEST_LINE = 1_000
 COMMANDS = (
     "list",
     "show",
+    "check",
     "run",
     "rerun",
     "tune",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import torch
@@ -76,7 +77,7 @@ class ActorPolicy(NetworkPolicy):
     """An actor that acts with its means."""
 
     def __init__(self, actor: Actor) -> None:
-        super().__init__(actor, lambda seen: actor.design(seen)[0], lambda seen: actor.control(seen)[0])
+        super().__init__(actor, partial(_mean, actor.design), partial(_mean, actor.control))
 
 
 def gaussian_log_prob(noise: Singles, log_std: Singles) -> Singles:
@@ -86,6 +87,11 @@ def gaussian_log_prob(noise: Singles, log_std: Singles) -> Singles:
     # evaluates the new policy at the same unclipped action, so the ratio is exact.
     result: Singles = -0.5 * (noise**2).sum(axis=-1) - (log_std + LOG_SQRT_TWO_PI).sum()
     return result
+
+
+def _mean(distribution: Distribution, observation: Tensor) -> Tensor:
+    # Not a lambda, for a policy is sent to other processes by pickle.
+    return distribution(observation)[0]
 
 
 def _sample(distribution: Distribution, observation: Singles, noise: Singles) -> Sample:

@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "results" / "reference"
 LONGER = ROOT / "results" / "longer"
 PAGES = {
-    ROOT / "README.md": REFERENCE,
+    ROOT / "docs" / "results.md": REFERENCE,
     ROOT / "docs" / "reference_points.md": REFERENCE,
     REFERENCE / "README.md": REFERENCE,
     LONGER / "README.md": LONGER,

@@ -36,11 +36,11 @@ FIXED = {
     "results/README.md": "results/index.md",
     "results/TUNING.md": "results/tuning.md",
 }
-"""Pages of the repository whose place on the site does not follow from their folder. The start page stands for README."""
+"""Pages whose place on the site does not follow from their folder. The start page stands for README."""
 
 
 def place_of(path: str) -> str | None:
-    """Return where a page of the repository is on the site, both relative to their roots; None: it is not a page of it."""
+    """Return where a file of the repository is on the site, both relative to their roots; None: it is not a page."""
     if path in FIXED:
         return FIXED[path]
     file = Path(path)
@@ -84,7 +84,7 @@ class Site:
         path.write_text(text, encoding="utf-8")
 
     def with_links(self, text: str, origin: str, place: str) -> str:
-        """Return a page's text with every link turned from the repository's file `origin` to the site's page `place`."""
+        """Return a text whose links, which lead from the file `origin`, lead from the site's page `place`."""
         parts, end = [], 0
         for code in CODE.finditer(text):
             parts += [self._turned(text[end : code.start()], origin, place), code[0]]

@@ -1,4 +1,4 @@
-"""Check a built site without a network: every internal link leads to a page and a place on it, every picture has a text.
+"""Check a built site without a network: every internal link leads somewhere, every picture has a text.
 
 python docs/site/check_links.py build/site
 """

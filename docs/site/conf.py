@@ -1,4 +1,4 @@
-"""Configuration of Sphinx. `make docs` gathers the sources of the site (assemble.py) and builds it with this."""
+"""Configuration of Sphinx. `make docs` gathers the sources of the site (make_site.py) and builds it with this."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from importlib.metadata import version as version_of
 
 GITHUB, UNPUBLISHED = "https://github.com/", "_owner_/codesign-bench"
 REPOSITORY = os.environ.get("REPOSITORY") or f"{GITHUB}{UNPUBLISHED}"
-"""Where the project is published; the workflow that publishes the site sets it. The notebooks name the same address, and
-get this one when the site is built. `_owner_` can be nobody's name on GitHub: write the owner's here and there."""
+"""Where the project is published; the workflow that publishes the site sets it. The notebooks name the same address,
+and get this one when the site is built. `_owner_` can be nobody's name on GitHub: write the owner's here and there."""
 
 project = "codesign-bench"
 author = "The codesign-bench authors"

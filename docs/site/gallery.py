@@ -2,9 +2,10 @@
 
     python docs/site/gallery.py [--results results/reference] [TASK ...]
 
-An animation shows the final policy of the first seed on the first two evaluation instances, whatever comes of them, side
-by side. `gallery.json` beside the animations records what each shows. Policies of an earlier version of a task cannot
-play any more: their pictures stay, until results of the new version are shipped, and their record says the version.
+An animation shows the final policy of the first seed on the first two evaluation instances, whatever comes of them,
+side by side. `gallery.json` beside the animations records what each shows. Policies of an earlier version of a task
+cannot play any more: their pictures stay until results of the new version are shipped, and their record says the
+version.
 """
 
 from __future__ import annotations
@@ -132,7 +133,8 @@ def main() -> int:
         (GALLERY / f"{task}_{method}.gif").write_bytes(content)
         known[task, method] = entry
         print(
-            f"{task} {method}: {len(content) // 1000} kB, solved {entry['solved']}, as evaluated: {entry['as_evaluated']}"
+            f"{task} {method}: {len(content) // 1000} kB, solved {entry['solved']}, "
+            f"as evaluated: {entry['as_evaluated']}"
         )
         path.write_text(json.dumps([known[key] for key in sorted(known)], indent=1) + "\n", encoding="utf-8")
     return 0

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from assemble import ROOT, Site, title_of
-
 from codesign_bench.claims.finding import VERDICTS
 from codesign_bench.method import load_method, method_names
 from codesign_bench.registry import built_in, load_module
@@ -152,7 +151,7 @@ def tasks_in_motion(up: str = "") -> str:
     for task in built_in("tasks"):
         found = sorted((e for e in entries() if e["task"] == task), key=lambda e: order.get(e["method"], len(order)))
         told = f"[{load_task(task).title}](docs/tasks/{task}.md): {lowered(asked(task))}"
-        figures.append(picture(found[0], told) if found else f"{told}\n")
+        figures.append(picture(found[0], f"{told}{former(found[0])}") if found else f"{told}\n")
     return cards(figures, up)
 
 
@@ -175,9 +174,10 @@ def gallery() -> str:
     """Return the page with a picture for every task and method."""
     parts = [
         "# Gallery",
-        "The final policy of the first seed on the first two evaluation instances of each task, whatever comes of them. The "
-        "left and the right half are two episodes with different goals: a method that designs a tool for each goal shows "
-        "two tools, the others show the same tool twice. Policies are from the [shipped results](results/reference/README.md).",
+        "The final policy of the first seed on the first two evaluation instances of each task, whatever comes of "
+        "them. The left and the right half are two episodes with different goals: a method that designs a tool for "
+        "each goal shows two tools, the others show the same tool twice. Policies are from the "
+        "[shipped results](results/reference/README.md).",
     ]
     for task in built_in("tasks"):
         found = {entry["method"]: entry for entry in entries() if entry["task"] == task}
@@ -224,8 +224,8 @@ def methods() -> str:
     header = ("method", "what learns", "tool", "source", "normalised score")
     paper, beyond = (rows[: len(load_study(DEFAULT_STUDY).methods)], rows[len(load_study(DEFAULT_STUDY).methods) :])
     lead = (
-        "The last column is the mean over tasks of the [normalised score](docs/reference_points.md#normalised-scores) at the "
-        "end of training in the [shipped results](results/reference/README.md), with its 95 % interval."
+        "The last column is the mean over tasks of the [normalised score](docs/reference_points.md#normalised-scores) "
+        "at the end of training in the [shipped results](results/reference/README.md), with its 95 % interval."
     )
     extra = sorted(
         path.stem for path in (ROOT / "docs" / "methods").glob("*.md") if path.stem not in built_in("methods")
@@ -302,10 +302,9 @@ def studies() -> str:
         study = load_study(name)
         rows.append((f"[{name}](/studies/{name}.md)", study.title, study.source, verdicts(study)))
     lead = (
-        "A [study](../docs/experiments.md) asks one question and describes as data what the answer needs: experiments, "
-        "figures and claims. Each claim is judged by a [rule](../docs/claims.md) that was written down before the results."
+        "A [study](docs/experiments.md) asks one question and describes as data what the answer needs: experiments, "
+        "figures and claims. Each claim is judged by a [rule](docs/claims.md) that was written down before the results."
     )
-    lead = lead.replace("../docs/", "docs/")
     listing = table(("study", "title", "source", "verdicts"), rows)
     return f"# Studies\n\n{lead}\n\n{listing}\n" + toctree(built_in("studies"))
 
@@ -344,8 +343,8 @@ def study_page(study: Study) -> str:
     for folder in folders:
         name = folder.relative_to(ROOT).as_posix()
         parts += [
-            f"## Verdicts\n\n[{name}]({name}/README.md) says how these results were made, and which verdicts on them do not "
-            "count any more. Read it before you use a number from here.",
+            f"## Verdicts\n\n[{name}]({name}/README.md) says how these results were made, and which verdicts on them do "
+            "not count any more. Read it before you use a number from here.",
             claims_of(folder),
             f"## Figures\n\n{figures_of(study, folder)}",
         ]
@@ -405,8 +404,8 @@ def _api_index(rooms: list[str]) -> str:
         for name in names
     )
     return (
-        "# API reference\n\n`import codesign_bench as cb` gives the names that most programs need. They are resolved on "
-        f"first use, so that the import is fast.\n\n```{{eval-rst}}\n{docs}\n```\n\n"
+        "# API reference\n\n`import codesign_bench as cb` gives the names that most programs need. They are resolved "
+        f"on first use, so that the import is fast.\n\n```{{eval-rst}}\n{docs}\n```\n\n"
         f"## Everything else\n\n{table(('package', 'content'), rows)}\n" + toctree([*rooms, "modules"])
     )
 

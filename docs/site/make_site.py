@@ -1,6 +1,6 @@
 """Build the site: gather its sources, let Sphinx build them with warnings as errors, check every internal link.
 
-python docs/site/build.py [--links]    into build/site; with --links, also ask for every external link
+python docs/site/make_site.py [--links]    into build/site; with --links, also ask for every external link
 """
 
 from __future__ import annotations

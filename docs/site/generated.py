@@ -36,6 +36,8 @@ FLAT = ("tasks", "methods", "paper_figs")
 def completed(name: str, text: str) -> str:
     """Return a page of the repository with its generated parts, and with the tables of contents that the site needs."""
     text = INSERT.sub(lambda found: in_links_of(name, INSERTS[found[1]]()), text)
+    if name.startswith("docs/tasks/"):
+        text = text.replace("\n## ", f"\n{in_motion(Path(name).stem)}\n## ", 1)
     text = CODE.sub(lambda found: f"```python\n{definition(ROOT / found[1], found[2])}\n```", text)
     return text + toctree(CHILDREN[name]()) if name in CHILDREN else text
 
@@ -112,6 +114,20 @@ def picture(entry: dict[str, Any], caption: str) -> str:
     return (
         f":::{{figure}} {{gallery}}{task}_{method}.gif\n"
         f":alt: Animation of {method} on {task}, two episodes side by side; {outcome(entry)}.\n\n{caption}\n:::\n"
+    )
+
+
+def in_motion(task: str) -> str:
+    """Return the animation of a task's first method for the task's page, or nothing."""
+    found = [entry for entry in entries() if entry["task"] == task]
+    by_method = {entry["method"]: entry for entry in found}
+    shown = [by_method[method] for method in method_names() if method in by_method][:1]
+    return "".join(
+        cards(
+            [picture(one, f"{one['method']}: {outcome(one)}.{former(one)} More in the {{doc}}`gallery </gallery>`.")],
+            "../",
+        )
+        for one in shown
     )
 
 
@@ -276,7 +292,8 @@ def success() -> str:
 
 def _interval(row: dict[str, str], column: str) -> str:
     value, low, high = (row[key] for key in (column, f"{column}_low", f"{column}_high"))
-    return f"{float(value):.2f}" + (f" [{float(low):.2f}, {float(high):.2f}]" if low else "")
+    # The space inside the brackets does not break a line.
+    return f"{float(value):.2f}" + (f" [{float(low):.2f},\N{NO-BREAK SPACE}{float(high):.2f}]" if low else "")
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -343,7 +360,7 @@ def study_page(study: Study) -> str:
     for folder in folders:
         name = folder.relative_to(ROOT).as_posix()
         parts += [
-            f"## Verdicts\n\n[{name}]({name}/README.md) says how these results were made, and which verdicts on them do "
+            f"## Verdicts\n\n[{name}]({name}/README.md) says how these results were made, and which verdicts do "
             "not count any more. Read it before you use a number from here.",
             claims_of(folder),
             f"## Figures\n\n{figures_of(study, folder)}",

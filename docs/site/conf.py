@@ -30,7 +30,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
 # Types of arrays keep their names; their shapes are in the docstrings.
-autodoc_type_aliases = {name: name for name in ("Booleans", "Floats", "Frame", "Singles", "Slots", "Array", "State")}
+autodoc_type_aliases = {name: name for name in ("Booleans", "Floats", "Frame", "Singles", "Slots", "Array")}
 python_maximum_signature_line_length = 88
 python_use_unqualified_type_names = True
 toc_object_entries = False

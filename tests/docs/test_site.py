@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -169,6 +170,19 @@ def test_pictures_of_the_gallery_move_and_are_small() -> None:
         sizes[path.name] = path.stat().st_size
     assert [name for name, size in sizes.items() if size > MOST_BYTES] == []
     assert {path.name for path in GALLERY.glob("*.gif")} == set(sizes)
+
+
+@pytest.mark.parametrize("workflow", sorted((ROOT / ".github" / "workflows").glob("*.yml")), ids=lambda path: path.stem)
+def test_actions_are_pinned_by_commit(workflow: Path) -> None:
+    used = re.findall(r"uses: (\S+)", workflow.read_text(encoding="utf-8"))
+    assert used
+    assert [action for action in used if not re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", action)] == []
+
+
+def test_a_page_of_a_task_moves() -> None:
+    name = "docs/tasks/push.md"
+    text = generated.completed(name, (ROOT / name).read_text(encoding="utf-8"))
+    assert text.index("push_gnn_ppo.gif") < text.index("## Action")
 
 
 def test_faults_of_a_built_site_are_told(tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ function motionButton(animations) {
   return button;
 }
 
-function reachable(label) {
+function reachable(label, drawer) {
   const box = document.getElementById(label.htmlFor);
   label.tabIndex = 0;
   label.setAttribute("role", "button");
@@ -52,8 +52,19 @@ function reachable(label) {
     if (event.key === "Enter" || event.key === " ") {
       event.preventDefault();
       box.click();
+      if (box.checked) drawer?.querySelector("a, input")?.focus();
     }
   });
+}
+
+// What a narrow screen has outside of its edge must not take the focus.
+function outOfReach(drawer, box) {
+  const update = () => {
+    drawer.inert = !box.checked && getComputedStyle(drawer).position === "fixed";
+  };
+  box.addEventListener("change", update);
+  window.addEventListener("resize", update);
+  update();
 }
 
 document.addEventListener("DOMContentLoaded", () => {
@@ -61,9 +72,15 @@ document.addEventListener("DOMContentLoaded", () => {
   if (animations.length) {
     document.querySelector("article h1").after(motionButton(animations));
   }
-  document
-    .querySelectorAll(".nav-overlay-icon, .toc-overlay-icon:not(.no-toc), .sidebar-tree label[for]")
-    .forEach(reachable);
+  for (const [name, side, labels] of [
+    ["__navigation", ".sidebar-drawer", ".nav-overlay-icon"],
+    ["__toc", ".toc-drawer", ".toc-overlay-icon:not(.no-toc)"],
+  ]) {
+    const drawer = document.querySelector(side);
+    if (drawer) outOfReach(drawer, document.getElementById(name));
+    document.querySelectorAll(labels).forEach((label) => reachable(label, drawer));
+  }
+  document.querySelectorAll(".sidebar-tree label[for]").forEach((label) => reachable(label));
   document.addEventListener("keydown", (event) => {
     if (event.key === "Escape") {
       for (const name of ["__navigation", "__toc"]) {

@@ -23,7 +23,7 @@ def draw(frame: pd.DataFrame) -> Figure:
         for _, curve in curves.groupby(["task", "seed"]):
             axes.plot(curve["env_steps"], curve["return_mean"], colour, linewidth=0.7)
         mean = curves.groupby("seed")["return_mean"].last().mean()
-        axes.plot([], [], colour, label=f"{practice:g} instances, final return {mean:.2f}")
+        axes.plot([], [], colour, label=f"instances: {practice:g}, final return {mean:.2f}")
     axes.set(xlabel="environment steps", ylabel="return on the evaluation instances")
     axes.legend()
     return figure

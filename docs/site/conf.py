@@ -34,6 +34,8 @@ autodoc_type_aliases = {name: name for name in ("Booleans", "Floats", "Frame", "
 python_maximum_signature_line_length = 88
 python_use_unqualified_type_names = True
 toc_object_entries = False
+# Words such as "source" in a docstring are names in several modules; they are not meant as links.
+suppress_warnings = ["ref.python"]
 default_role = "code"
 
 html_theme = "furo"

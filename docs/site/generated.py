@@ -71,11 +71,26 @@ def definition(path: Path, name: str) -> str:
     """
     source = path.read_text(encoding="utf-8")
     for node in ast.parse(source).body:
-        targets = node.targets if isinstance(node, ast.Assign) else []
-        names = [getattr(node, "name", ""), *(one.id for one in targets if isinstance(one, ast.Name))]
-        if name in names:
+        if name in names_of(node):
             return ast.get_source_segment(source, node) or ""
     raise ValueError(f"{path} defines no {name}")
+
+
+def names_of(node: ast.stmt) -> list[str]:
+    """Return the names that a statement defines."""
+    targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+    return [getattr(node, "name", ""), *(one.id for one in targets if isinstance(one, ast.Name))]
+
+
+def public(path: Path) -> list[str]:
+    """Return the public classes and functions that a module defines, and the values that a docstring follows."""
+    body = ast.parse(path.read_text(encoding="utf-8")).body
+    found = []
+    for node, after in zip(body, [*body[1:], None], strict=True):
+        told = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        if told or isinstance(node, ast.ClassDef | ast.FunctionDef):
+            found += [name for name in names_of(node) if name and not name.startswith("_")]
+    return list(dict.fromkeys(found))
 
 
 def toctree(entries: Iterable[str]) -> str:
@@ -443,7 +458,9 @@ def _room(package: str, files: list[Path], root: Path, title: str = "") -> str:
         module = ".".join(("codesign_bench", *path.relative_to(root).with_suffix("").parts))
         if path.stem.startswith("_") or not _has_text(path):
             continue
-        parts.append(f"## {module}\n\n```{{eval-rst}}\n.. automodule:: {module}\n   :members:\n```")
+        # Named one by one: what a module only imports is not looked at.
+        members = f"   :members: {', '.join(names)}\n" if (names := public(path)) else ""
+        parts.append(f"## {module}\n\n```{{eval-rst}}\n.. automodule:: {module}\n{members}```")
     return "\n\n".join(parts) + "\n"
 
 

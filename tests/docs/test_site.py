@@ -144,6 +144,16 @@ def test_the_api_reference_has_every_package_and_public_name() -> None:
     assert ".. autofunction:: codesign_bench.load_results" in found["api/index.md"]
 
 
+def test_public_names_are_those_that_a_module_defines_and_explains(tmp_path: Path) -> None:
+    path = tmp_path / "module.py"
+    path.write_text(
+        'from math import pi\nA: int = 1\n"""Told."""\nB = 2\nC = 3\n"""Told."""\n_D = 4\n"""Told."""\n'
+        "def f(): ...\ndef _g(): ...\nclass K: ...\n",
+        encoding="utf-8",
+    )
+    assert generated.public(path) == ["A", "C", "f", "K"]
+
+
 def test_code_of_a_file_is_shown_by_name() -> None:
     path = ROOT / "docs" / "examples" / "practice.py"
     assert generated.definition(path, "Practice").startswith("class Practice(Axis):")

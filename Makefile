@@ -37,7 +37,7 @@ WITHOUT_AVX := ATEN_CPU_CAPABILITY=default MKL_CBWR=COMPATIBLE ONEDNN_MAX_CPU_IS
 	NPY_DISABLE_CPU_FEATURES=X86_V3,AVX2,FMA3,X86_V4,AVX512F,AVX512_SKX,AVX512_ICL,AVX512_SPR \
 	GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA
 
-.PHONY: help run test test-environments test-portable without-avx512 without-avx check slow package install clean
+.PHONY: help run test test-environments test-portable without-avx512 without-avx check slow docs docs-links package install clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 22
@@ -79,6 +79,12 @@ check: .venv/installed-test ## check style and types alone
 slow: .venv/installed-test ## run the slow tests: killed sweeps, learning, wheels
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -m slow
 
+docs: .venv/installed-docs ## build the documentation site in build/site; warnings and broken links are errors
+	OMP_NUM_THREADS=1 $(BIN)/python docs/site/make_site.py
+
+docs-links: .venv/installed-docs ## ask for every external link of the site; needs a network
+	$(BIN)/python docs/site/make_site.py --links
+
 package: ## build the wheels of program and reference results, install them in a new environment, run it
 	PYTHON=$(PYTHON) TORCH_INDEX=$(TORCH_INDEX) .ci/package
 
@@ -108,4 +114,8 @@ clean: ## remove the environment and what tools left behind; results stay
 
 .venv/installed-test: .venv/installed
 	$(PIP) install $(PIP_FLAGS) -c constraints.txt -e ".[test]"
+	touch $@
+
+.venv/installed-docs: .venv/installed
+	$(PIP) install $(PIP_FLAGS) -c constraints.txt -e ".[docs]"
 	touch $@

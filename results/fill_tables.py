@@ -29,7 +29,7 @@ REFERENCE = ROOT / "results" / "reference"
 LONGER = ROOT / "results" / "longer"
 SUBMISSIONS = ROOT / "results" / "submissions"
 PAGES = {
-    ROOT / "README.md": REFERENCE,
+    ROOT / "docs" / "results.md": REFERENCE,
     ROOT / "docs" / "reference_points.md": REFERENCE,
     ROOT / "docs" / "leaderboard.md": SUBMISSIONS,
     REFERENCE / "README.md": REFERENCE,

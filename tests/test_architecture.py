@@ -53,8 +53,11 @@ TESTED_ELSEWHERE = {
 OF_NO_MODULE = {
     "tests/claims/test_a_a.py": "of all rules that compare methods",
     "tests/docs/test_contributing.py": "of what CONTRIBUTING.md writes out",
+    "tests/docs/test_examples.py": "of the files in docs/examples",
     "tests/docs/test_make_task_pages.py": "of the script docs/make_task_pages.py",
+    "tests/docs/test_notebooks.py": "of the notebooks in docs/notebooks",
     "tests/docs/test_pages.py": "of the documentation",
+    "tests/docs/test_site.py": "of the scripts in docs/site",
     "tests/learning/test_pendulum.py": "of the whole learner, beside another library's",
     "tests/learning/test_plain_update.py": "of all of an update's modules together, beside a plain one",
     "tests/methods/test_contract.py": "of every method",

@@ -72,6 +72,7 @@ TABLES: Mapping[str, str] = {
     "cutout_regions/toy_reach-toy_search.csv": "return",
     "deployment/toy_reach/protocol.csv": "outcome",
     "headroom/toy_reach-toy_search-seed-00.csv": "best_return",
+    "design_values/toy_reach-toy_search-seed-00.csv": "value",
     "best_known/toy_reach.csv": "return",
 }
 """Tables beside the cells, each with a column of numbers."""

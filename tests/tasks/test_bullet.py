@@ -62,6 +62,6 @@ def test_without_pybullet_the_task_says_what_is_missing(monkeypatch: pytest.Monk
     for name in ("fetch_cube", "_bullet", "_carriers"):
         monkeypatch.delitem(sys.modules, f"codesign_bench.tasks.{name}")
     monkeypatch.setitem(sys.modules, "pybullet", None)
-    with pytest.raises(UserError, match="pip install pybullet"):
+    with pytest.raises(UserError, match="3D tasks need pybullet, which is not installed"):
         load_task("fetch_cube")
     assert load_task("push").name == "push"

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from packaging.requirements import Requirement
 
 Section: TypeAlias = Mapping[str, str]
-"""What is told -> its value, in the order of printing."""
+"""Fact -> its value, in the order of printing."""
 NOT_INSTALLED = "not installed"
 HOSTED = ("system", "cpu", "architecture")
 """Facts about the host that identify nobody."""
@@ -108,7 +108,7 @@ def _pools() -> Section:
         from threadpoolctl import threadpool_info
     except ImportError:  # it comes with scikit-learn
         return {}
-    import numpy  # noqa: F401  # its pools are among those that are told
+    import numpy  # noqa: F401  # its thread pools are reported, too
 
     pools = {
         f"{pool['internal_api']} ({pool['prefix']})": ", ".join(
@@ -125,9 +125,10 @@ def _count(threads: int) -> str:
 
 
 def _requirements() -> list[Requirement]:
-    """Return what the installed package requires, with its extras; nothing if it is not installed but on the path.
+    """Return what the installed package requires, with its extras.
 
-    Neither can it be told where the environments alone are installed, without what reads requirements.
+    Nothing is known of them where the package is on the path without being installed, or where `packaging` is missing,
+    as with the environments alone.
     """
     try:
         from packaging.requirements import Requirement

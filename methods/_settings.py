@@ -54,7 +54,10 @@ def tuned(profile: str, table: Tuned) -> Settings:
 
 def ppo_settings(profile: str, task_name: str) -> Settings:
     """Return the optimiser settings of one of our own profiles for a task; none for any other profile."""
-    if profile not in LAYERS:
-        return {}
-    of_task = sourced(PPO_BY_TASK.get(task_name, {}), f"tuned for {task_name} (ours)")
-    return {**tuned(profile, PPO), **of_task}
+    return {**tuned(profile, PPO), **tuned_for(profile, task_name, PPO_BY_TASK)}
+
+
+def tuned_for(profile: str, task_name: str, table: Mapping[str, Mapping[str, Any]]) -> Settings:
+    """Return the settings of `table` for a task in one of our own profiles; none for any other profile."""
+    found = table.get(task_name, {}) if profile in LAYERS else {}
+    return sourced(found, f"tuned for {task_name} (ours)")

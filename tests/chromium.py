@@ -105,7 +105,7 @@ class Tab:
         path.write_bytes(base64.b64decode(shot["data"]))
 
     def errors(self) -> list[str]:
-        """Return what the page's console was told of errors so far."""
+        """Return what the page's console reported as errors so far."""
         found = [message for message in self.messages if message.get("method") == "Runtime.exceptionThrown"]
         logged = [message["params"]["entry"] for message in self.messages if message.get("method") == "Log.entryAdded"]
         return [str(message) for message in found] + [str(entry) for entry in logged if entry["level"] == "error"]

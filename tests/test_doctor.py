@@ -1,4 +1,4 @@
-"""What a bug report is told: what is installed, what is missing and for what, and nothing about a person."""
+"""What a bug report says: what is installed, what is missing and for what, and nothing about a person."""
 
 from __future__ import annotations
 
@@ -53,10 +53,10 @@ def test_threads_are_told_as_they_are_set(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_nobody_is_named(diagnosis: dict[str, doctor.Section]) -> None:
-    told = " ".join(value for section in diagnosis.values() for value in section.values())
-    assert str(Path.home()) not in told
-    assert platform.node() not in told.split()
-    assert getpass.getuser() not in told.split()
+    lines = " ".join(value for section in diagnosis.values() for value in section.values())
+    assert str(Path.home()) not in lines
+    assert platform.node() not in lines.split()
+    assert getpass.getuser() not in lines.split()
 
 
 def test_every_member_counts(diagnosis: dict[str, doctor.Section]) -> None:
@@ -65,11 +65,11 @@ def test_every_member_counts(diagnosis: dict[str, doctor.Section]) -> None:
 
 
 def test_what_is_missing_is_told_for_each_task_and_method() -> None:
-    told = told_without("pybullet", "pybullet_data", "torch")
-    assert any(line.split()[:1] == ["fetch_cube"] and "need pybullet" in line for line in told)
-    assert any(line.split()[:1] == ["gnn_ppo"] and "it needs torch" in line for line in told)
-    assert any(line.split()[:1] == ["GPU"] and "torch cannot be imported" in line for line in told)
-    assert not any(line.split()[:1] == ["push"] for line in told)
+    lines = told_without("pybullet", "pybullet_data", "torch")
+    assert any(line.split()[:1] == ["fetch_cube"] and "need pybullet" in line for line in lines)
+    assert any(line.split()[:1] == ["gnn_ppo"] and "it needs torch" in line for line in lines)
+    assert any(line.split()[:1] == ["GPU"] and "torch cannot be imported" in line for line in lines)
+    assert not any(line.split()[:1] == ["push"] for line in lines)
 
 
 REQUIREMENTS = ["numpy >=99", "no-such-package >=2.0", 'numpy; extra == "one"', 'no-such-extra >=1; extra == "two"']

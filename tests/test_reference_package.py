@@ -94,7 +94,7 @@ def test_an_installed_package_is_found_by_name(wheels: list[Path], tmp_path: Pat
         f"cb.load_policy('reference/{next(fitting).as_posix()}'); "
         "print(reference_folder(), len(cb.load_results('reference')))"
     )
-    told = python("-c", line, folder=elsewhere, path=site).splitlines()[-1]
-    assert told.startswith(str(site / "codesign_bench_reference" / "reference"))
+    printed = python("-c", line, folder=elsewhere, path=site).splitlines()[-1]
+    assert printed.startswith(str(site / "codesign_bench_reference" / "reference"))
     compared = ("-m", "codesign_bench", "compare", "reference", "reference")
     assert "average of" in python(*compared, folder=elsewhere, path=site)

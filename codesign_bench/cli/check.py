@@ -49,7 +49,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         on = load_task(options.on or usable_tasks(task_names())[0])
         names = chosen_methods(options.method, log, sound=False)
         examined += [(f"method {name} on {on.name}", partial(examine_method, name, on)) for name in names]
-    wrong = [title for title, examine in examined if not _told(title, examine(), log)]
+    wrong = [title for title, examine in examined if not _keeps_all(title, examine(), log)]
     if len(examined) > 1:
         log(f"{len(examined) - len(wrong)} of {len(examined)} keep the contract" + _named(wrong))
     return EXIT_SOME_WRONG if wrong else EXIT_ALL_SOUND
@@ -59,7 +59,7 @@ def _named(wrong: list[str]) -> str:
     return f"; not: {', '.join(wrong)}" if wrong else ""
 
 
-def _told(title: str, verdicts: Iterator[Verdict], log: Log) -> bool:
+def _keeps_all(title: str, verdicts: Iterator[Verdict], log: Log) -> bool:
     """Print the verdicts on a member as they come; return whether nothing is wrong."""
     log(title)
     counts = {PASSED: 0, LEFT_OUT: 0, WRONG: 0}

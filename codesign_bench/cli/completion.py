@@ -52,7 +52,7 @@ def answer_shell(make_parser: Callable[[], argparse.ArgumentParser]) -> None:
     """Answer a shell that asks for completions, and end; do nothing if none asks."""
     if ASKED not in os.environ:
         return
-    import argcomplete  # a shell asks only where `run` has told it to
+    import argcomplete  # a shell asks only after `run` has set it up
 
     parser = make_parser()
     with_choices(parser)
@@ -67,6 +67,7 @@ def with_choices(parser: argparse.ArgumentParser) -> None:
                 with_choices(child)
         for name in (*action.option_strings, action.dest):
             if name in CHOICES:
+                # argcomplete looks for this attribute, which argparse does not declare.
                 action.completer = _completer(CHOICES[name])  # type: ignore[attr-defined]
 
 

@@ -121,5 +121,5 @@ def undefined(member_class: type, base: type) -> list[str]:
 
 def counted(found: Iterable[object]) -> str:
     """Return a few things in words: the first three, and how many more there are."""
-    told = [str(thing) for thing in found]
-    return ", ".join(told[:3]) + (f" and {len(told) - 3} more" if len(told) > 3 else "")
+    texts = [str(thing) for thing in found]
+    return ", ".join(texts[:3]) + (f" and {len(texts) - 3} more" if len(texts) > 3 else "")

@@ -44,6 +44,7 @@ def loads(name: str) -> Iterator[Fault]:
 def hyperparameters_have_defaults(subject: Subject) -> Iterator[Fault]:
     """Yield what is missing."""
     config = subject.method_class.config_class
+    # No public function tells whether a dataclass is frozen.
     if not dataclasses.is_dataclass(config) or not config.__dataclass_params__.frozen:  # type: ignore[attr-defined]
         yield Fault(f"`config_class` is {config.__name__}", "a class with @dataclass(frozen=True)")
         return

@@ -95,7 +95,7 @@ def policies_can_be_sent(subject: Subject) -> Iterator[Fault]:
     """Yield why it cannot, or what it becomes on the way."""
     policy = subject.trained().policy()
     try:
-        copy = pickle.loads(pickle.dumps(policy))
+        copy = pickle.loads(pickle.dumps(policy))  # bytes that were just made here; nothing is read
     except Exception as error:
         yield Fault(f"pickling it raised {type(error).__name__}: {error}", "no error: evaluation uses several cores")
         return

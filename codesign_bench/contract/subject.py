@@ -74,6 +74,7 @@ class CountingTask:
         self.env_steps = 0
         self.task = type(task)()
         make = self.task.make_simulator
+        # The method asks the task for simulators itself, so they can be counted only there.
         self.task.make_simulator = lambda *arguments: self._counting(make(*arguments))  # type: ignore[method-assign]
 
     def _counting(self, simulator: Simulator) -> Simulator:

@@ -82,8 +82,8 @@ def spaces_fit(task: Task) -> Iterator[Fault]:
 @promised("Every entry of an observation has a name of its own.", f"{TASK}.state_space")
 def names_differ(task: Task) -> Iterator[Fault]:
     """Yield names that are used twice."""
-    told = [*task.state_space.names, *task.goal_space.names, *task.design_space.names, *task.layout.PHASE_NAMES]
-    for name, count in Counter(told).items():
+    names = [*task.state_space.names, *task.goal_space.names, *task.design_space.names, *task.layout.PHASE_NAMES]
+    for name, count in Counter(names).items():
         if count > 1:
             yield Fault(
                 f"'{name}' names {count} entries", "different names for the entries of state, goal, design and phase"

@@ -16,7 +16,7 @@ from codesign_bench.task import Floats, Task, load_task
 FRACTIONS = (0.2, 0.5, 0.8)
 SAMPLES = 4_000
 RARE = 1e-3
-"""A difference that chance makes once in a thousand samples is told as a fault."""
+"""A difference that chance makes once in a thousand samples is reported as a fault."""
 TASK = "codesign_bench.task.Task"
 
 
@@ -125,8 +125,8 @@ def region_ends_with_the_instances(task: Task) -> Iterator[Fault]:
         point = 0.5 * (low + high)
         point[index] = corner[index]
         if task.in_region(point[None])[0]:
-            told = ", ".join(f"{name} = {point[i]:g}" for name, i in zip(task.position_entries, index, strict=True))
-            yield Fault(f"{told} is in the region", "no point beyond the instance space is")
+            place = ", ".join(f"{name} = {point[i]:g}" for name, i in zip(task.position_entries, index, strict=True))
+            yield Fault(f"{place} is in the region", "no point beyond the instance space is")
 
 
 @promised("Training with a cutout never sees it, and sees the rest as before.", f"{TASK}.in_cutout")

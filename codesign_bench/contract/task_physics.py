@@ -83,7 +83,7 @@ def play_at_random(task: Task, steps: int) -> Worst:
         if step % HELD_STEPS == 0:
             controls = random_controls(rng, task, SLOTS)
         reward, terminated, truncated = episodes.control(slots, controls)
-        worst.finite &= all(np.isfinite(told).all() for told in (reward, episodes.simulator.outcome))
+        worst.finite &= all(np.isfinite(values).all() for values in (reward, episodes.simulator.outcome))
         worst.finite &= bool(np.isfinite(episodes.observation).all())
         worst.look(episodes.simulator, slots)
         starting = slots[terminated | truncated]
@@ -142,6 +142,7 @@ def _refined(task: Task, refinement: int) -> Task:
     """Return the task with finer physics steps."""
     other = load_task(task.name)
     make = other.make_simulator
+    # An evaluation asks for simulators without a refinement.
     other.make_simulator = lambda num_slots: make(num_slots, refinement)  # type: ignore[method-assign,misc,assignment]
     return other
 
@@ -168,7 +169,7 @@ def looking_changes_nothing(task: Task) -> Iterator[Fault]:
         for step, control in enumerate(controls):
             _, terminated, truncated = episodes.control(slot, control[None])
             if episodes is watched:
-                with suppress(NotImplementedError):
+                with suppress(NotImplementedError):  # `inspect` is optional
                     watched.simulator.inspect(0)
                 if step % 6 == 0:
                     pictures.append(watched.simulator.render(0))

@@ -38,10 +38,10 @@ def reward_is_the_sum_of_its_terms(task: Task) -> Iterator[Fault]:
     declared = tuple(task.reward_terms) or (TASK_TERM,)
     for turn in control_steps(task, episodes):
         terms = [values[turn.slots] for values in episodes.reward_terms.values()]
-        told = tuple(name for name in episodes.reward_terms if name != TRADEOFF_TERM)
-        if told != declared:
+        given = tuple(name for name in episodes.reward_terms if name != TRADEOFF_TERM)
+        if given != declared:
             yield Fault(
-                f"`set_reward` is given {', '.join(told)}",
+                f"`set_reward` is given {', '.join(given)}",
                 f"the terms that `reward_terms` declares, in its order: {', '.join(declared)}",
             )
             return
@@ -103,5 +103,5 @@ def new_episodes_forget(task: Task) -> Iterator[Fault]:
         **simulator.conditions,
         "met_steps": simulator.met_steps,
     }
-    if told := [name for name, values in left.items() if values[0]]:
-        yield Fault(f"after `begin`, not zero: {', '.join(told)}", "`self.forget(slots)` in `begin`")
+    if kept := [name for name, values in left.items() if values[0]]:
+        yield Fault(f"after `begin`, not zero: {', '.join(kept)}", "`self.forget(slots)` in `begin`")

@@ -148,8 +148,8 @@ def measure_cell(
     path, values_path = path_of(results, cell.record), path_of(results, cell.record, VALUES_FOLDER)
     missing = _missing(cell, policy_name, controller, results, budget, instances)
     if missing:
-        told = _work(controller, len(missing), budget, jobs).line()
-        log(f"trying other tools on {len(missing)} instances of {name_of(cell)}: {told}; kept in {path}")
+        work = _work(controller, len(missing), budget, jobs).line()
+        log(f"trying other tools on {len(missing)} instances of {name_of(cell)}: {work}; kept in {path}")
         tools = controller.designs()
         calls = (delayed(_measure)(folder, policy_name, tools, index, budget) for index in missing)
         try:

@@ -162,8 +162,8 @@ def measure_missing(results: Path, tasks: Iterable[str], log: Log, *, again: boo
         task = load_task(name)
         points = [] if again else _stored(task, results)
         if not points:
-            told = expected_work(results, task, again=again, jobs=jobs).line()
-            log(f"playing the reference points of {name}: {told}; kept in {results / FILE}")
+            work = expected_work(results, task, again=again, jobs=jobs).line()
+            log(f"playing the reference points of {name}: {work}; kept in {results / FILE}")
             points = measure(task, jobs=jobs, tried=None if again else stored_table(results, name))
         _write(results, task, known, points)
 
@@ -280,11 +280,11 @@ def _single_tools(
     chosen = np.argsort(-early.mean(axis=1), kind="stable")[:finalists]
     returns, successes = _play_all(task, designs[chosen], instances, jobs)
     earns, solves = int(returns.mean(axis=1).argmax()), int(successes.mean(axis=1).argmax())
-    told = f"tool {chosen[earns]} by return, tool {chosen[solves]} by success, of {len(designs)}"
-    yield Point(SINGLE_TOOL, returns[earns], successes[solves], len(designs), told)
+    source = f"tool {chosen[earns]} by return, tool {chosen[solves]} by success, of {len(designs)}"
+    yield Point(SINGLE_TOOL, returns[earns], successes[solves], len(designs), source)
     sources = [f"tool {tool}" for tool in chosen[returns.argmax(axis=0)]]
-    told = f"for each instance the best of {len(chosen)} tools, the script's controller"
-    yield Point(ANY_TOOL, returns.max(axis=0), successes.max(axis=0), len(chosen), told, sources)
+    source = f"for each instance the best of {len(chosen)} tools, the script's controller"
+    yield Point(ANY_TOOL, returns.max(axis=0), successes.max(axis=0), len(chosen), source, sources)
 
 
 def _play_all(task: Task, designs: Floats, instances: Floats, jobs: int) -> tuple[Floats, Floats]:

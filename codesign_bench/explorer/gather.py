@@ -287,7 +287,7 @@ def _numbers_of(item: Item) -> list[float]:
 
 
 def _reason(message: str) -> str:
-    """Return a message without the cell's own path, so that cells with the same reason are told of once."""
+    """Return a message without the cell's own path, so that cells with the same reason are named once."""
     return message.split("' ", 1)[1] if message.startswith("'") else message
 
 

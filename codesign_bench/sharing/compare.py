@@ -93,10 +93,11 @@ def compare(first: Path, second: Path, methods: Sequence[str] | None = None, var
     singles = [_single(pair, scales) for pair in pairs]
     matched = {id(found) for pair in pairs for found in pair}
     alone = {
-        name: _told(found for found in side if id(found) not in matched) for name, side in (("A", of_a), ("B", of_b))
+        name: _described(found for found in side if id(found) not in matched)
+        for name, side in (("A", of_a), ("B", of_b))
     }
-    told = [f"only in {name}: {others}" for name, others in alone.items() if others]
-    return Comparison(first, second, adjusted(singles), adjusted(_averages(singles, scales)), told)
+    remarks = [f"only in {name}: {others}" for name, others in alone.items() if others]
+    return Comparison(first, second, adjusted(singles), adjusted(_averages(singles, scales)), remarks)
 
 
 def common_scales(first: Scales, second: Scales) -> dict[tuple[str, int], Reference]:
@@ -199,13 +200,13 @@ def _budgets(differences: Iterable[Difference]) -> list[str]:
     for found in differences:
         steps = [side.env_steps for side in found.pairs[0]]
         if max(steps) > (1.0 + BUDGET_TOLERANCE) * min(steps):
-            told = " and ".join(f"{count:,.0f}" for count in steps)
-            lines.append(f"budgets differ on {found.place}, {found.methods[0]}: {told} environment steps")
+            counts = " and ".join(f"{count:,.0f}" for count in steps)
+            lines.append(f"budgets differ on {found.place}, {found.methods[0]}: {counts} environment steps")
     return lines
 
 
 def _nothing_common(comparison: Sequence[tuple[Path, Sequence[Finals]]], variants: bool) -> str:
-    has = (f"{shown(folder)} has {_told(found) or 'no finished cell to compare'}" for folder, found in comparison)
+    has = (f"{shown(folder)} has {_described(found) or 'no finished cell to compare'}" for folder, found in comparison)
     more = "" if variants else ", or other variants with --variants"
     return (
         "no task, version, variant and method are in both; compare two methods with --method M_OF_A M_OF_B"
@@ -213,7 +214,7 @@ def _nothing_common(comparison: Sequence[tuple[Path, Sequence[Finals]]], variant
     )
 
 
-def _told(group: Iterable[Finals]) -> str:
+def _described(group: Iterable[Finals]) -> str:
     """Return which methods there are of each task and variant: "a, b on push (version 1)"."""
     methods: dict[str, list[str]] = {}
     for found in group:

@@ -222,16 +222,16 @@ def _interval(found: Estimate) -> str:
 
 def _about(submission: Submission) -> tuple[str, ...]:
     """Return the row of an archive."""
-    told = submission.manifest
-    commits = [f"{(code.get('commit') or NOT_RECORDED)[:SHORT]} ({code.get('cells')})" for code in told.code]
+    manifest = submission.manifest
+    commits = [f"{(code.get('commit') or NOT_RECORDED)[:SHORT]} ({code.get('cells')})" for code in manifest.code]
     return (
         submission.name,
-        told.title or NOTHING,
-        told.by or NOTHING,
-        str(told.cells),
-        str(told.policies),
-        told.ended[:DAY] or NOTHING,
+        manifest.title or NOTHING,
+        manifest.by or NOTHING,
+        str(manifest.cells),
+        str(manifest.policies),
+        manifest.ended[:DAY] or NOTHING,
         ", ".join(commits),
-        told.tuning_note or NOTHING,
-        told.note or NOTHING,
+        manifest.tuning_note or NOTHING,
+        manifest.note or NOTHING,
     )

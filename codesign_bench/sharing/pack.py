@@ -95,8 +95,8 @@ def pack(results: Path, out: Path, order: Order, log: Log) -> Manifest:
         return write_archive(out, results, names, manifest)
 
 
-def manifest_of(records: Sequence[CellRecord], **told: Any) -> Manifest:
-    """Return the manifest of cells with these records, without files; `told` are its other entries."""
+def manifest_of(records: Sequence[CellRecord], **entries: Any) -> Manifest:
+    """Return the manifest of cells with these records, without files; `entries` are its others."""
     codes: dict[str, dict[str, Any]] = {}
     for record in records:
         code = {name: record.code.get(name) for name in NO_CODE}
@@ -110,7 +110,7 @@ def manifest_of(records: Sequence[CellRecord], **told: Any) -> Manifest:
         versions={
             name: Counter(record.versions.get(name) or "not installed" for record in records) for name in packages
         },
-        **told,
+        **entries,
     )
 
 
@@ -125,13 +125,13 @@ def spent_on_tuning(given: Sequence[str]) -> tuple[dict[str, dict[str, int]], st
     """
     steps: dict[str, dict[str, int]] = {}
     words = []
-    for told in given:
-        if not os.path.isdir(told):
-            words.append(f"{int(told):,} steps" if COUNT.fullmatch(told) else told)
+    for tuning in given:
+        if not os.path.isdir(tuning):
+            words.append(f"{int(tuning):,} steps" if COUNT.fullmatch(tuning) else tuning)
             continue
-        found = [cell.record for cell in find_cells(Path(told))]
+        found = [cell.record for cell in find_cells(Path(tuning))]
         if not found:
-            raise UserError(f"--tuning {told}: no cells of a search in this folder")
+            raise UserError(f"--tuning {tuning}: no cells of a search in this folder")
         for record in found:
             of_task = steps.setdefault(record.task, {})
             of_task[record.method] = of_task.get(record.method, 0) + record.env_steps

@@ -158,16 +158,16 @@ class Manifest:
         if not isinstance(code, list) or not all(isinstance(part, dict) for part in code):
             raise ValueError("'code' is not a list of objects")
         return cls(
-            title=_told(content, "title"),
-            by=_told(content, "by"),
-            note=_told(content, "note"),
-            ended=_told(content, "ended"),
+            title=_optional_text(content, "title"),
+            by=_optional_text(content, "by"),
+            note=_optional_text(content, "note"),
+            ended=_optional_text(content, "ended"),
             cells=optional(whole, content, "cells") or 0,
             policies=optional(whole, content, "policies") or 0,
             packed_by=optional(entries, content, "packed_by") or {},
             code=tuple(code),
             versions=_counts(optional(entries, content, "versions") or {}),
-            tuning_note=_told(tuning, "note"),
+            tuning_note=_optional_text(tuning, "note"),
             tuning_steps=_counts(optional(entries, tuning, "env_steps") or {}),
             files=_files(entries(content, "files")),
         )
@@ -437,7 +437,7 @@ def _entry(name: str) -> zipfile.ZipInfo:
     return entry
 
 
-def _told(content: Mapping[str, Any], name: str) -> str:
+def _optional_text(content: Mapping[str, Any], name: str) -> str:
     """Return a text that the author may have written, or an empty one."""
     return text(content, name, most=LONGEST_NOTE) if content.get(name) is not None else ""
 

@@ -133,18 +133,22 @@ DEPLOYMENT = Measurements(
         alike=("kind", "tool"),
     ),
 )
+INSTANCE_OF_A_POLICY = {
+    "task": TEXT,
+    "task_version": WHOLE,
+    "method": TEXT,
+    "variant": TEXT,
+    "seed": WHOLE,
+    "label": TEXT,
+    "policy": TEXT,
+    "instance": WHOLE,
+}
+"""Columns that name a policy and an instance on which it was measured."""
 HEADROOM = Measurements(
     "headroom/*.csv",
     Form(
         {
-            "task": TEXT,
-            "task_version": WHOLE,
-            "method": TEXT,
-            "variant": TEXT,
-            "seed": WHOLE,
-            "label": TEXT,
-            "policy": TEXT,
-            "instance": WHOLE,
+            **INSTANCE_OF_A_POLICY,
             "designer_return": NUMBER,
             "designer_success": SHARE,
             "best_return": NUMBER,
@@ -170,14 +174,7 @@ DESIGN_VALUES = Measurements(
     "design_values/*.csv",
     Form(
         {
-            "task": TEXT,
-            "task_version": WHOLE,
-            "method": TEXT,
-            "variant": TEXT,
-            "seed": WHOLE,
-            "label": TEXT,
-            "policy": TEXT,
-            "instance": WHOLE,
+            **INSTANCE_OF_A_POLICY,
             "tool": WHOLE,
             "origin": TEXT,
             "value": NUMBER,

@@ -103,8 +103,8 @@ def unpacked(path: Path) -> Path:
     try:
         found = os.stat(path)
     except (OSError, ValueError) as error:
-        told = on_one_line(str(path))
-        raise UserError(f"no archive '{told}'; write one with: codesign-bench pack RUNS --out {told}") from error
+        name = on_one_line(str(path))
+        raise UserError(f"no archive '{name}'; write one with: codesign-bench pack RUNS --out {name}") from error
     return Path(_unpacked(path, found.st_ino, found.st_size, found.st_mtime_ns).name) / path.stem
 
 
@@ -162,7 +162,7 @@ def _cell_in(results: Path, cell: Path, name: Path) -> Path:
         return results / cell
     there = next(folder for folder in (cell, *cell.parents) if (results / folder).is_dir())
     choices = sorted(entry.name for entry in (results / there).iterdir() if entry.is_dir())
-    told = ", ".join(choices[:MOST_CHOICES]) + (", ..." if len(choices) > MOST_CHOICES else "")
+    listed = ", ".join(choices[:MOST_CHOICES]) + (", ..." if len(choices) > MOST_CHOICES else "")
     raise UserError(
-        f"'{on_one_line(str(name / cell))}' is not a cell; {on_one_line(str(name / there))} has: {on_one_line(told)}"
+        f"'{on_one_line(str(name / cell))}' is not a cell; {on_one_line(str(name / there))} has: {on_one_line(listed)}"
     )

@@ -14,11 +14,11 @@ from codesign_bench.storage.records import RUNNING
 
 
 def read_progress(folder: Path, since: float = 0.0) -> dict[str, Any] | None:
-    """Return what the process of a cell last told of itself, or None if that cannot be read.
+    """Return what the process of a cell last reported of itself, or None if that cannot be read.
 
     Args:
         folder: the cell's.
-        since: seconds since the epoch; what was told earlier is nothing.
+        since: seconds since the epoch; an earlier report counts as none.
     """
     try:
         found = read_json(folder / PROGRESS_FILE)
@@ -31,9 +31,9 @@ def read_progress(folder: Path, since: float = 0.0) -> dict[str, Any] | None:
 
 def env_steps_of(cell: StoredCell) -> int:
     """Return how far a cell is, in environment steps: by its last evaluation, its record, or its process."""
-    told = read_progress(cell.folder) if cell.status == RUNNING else None
+    progress = read_progress(cell.folder) if cell.status == RUNNING else None
     evaluated = int(cell.last_evaluation().get("env_steps", 0))
-    return max(evaluated, cell.record.env_steps, 0 if told is None else int(told["env_steps"]))
+    return max(evaluated, cell.record.env_steps, 0 if progress is None else int(progress["env_steps"]))
 
 
 def status_row(out: Path, cell: StoredCell) -> tuple[str, ...]:

@@ -52,8 +52,8 @@ class Snapshot:
 
     def to_json(self) -> dict[str, Any]:
         """Return the progress as an event for programs."""
-        told = ("phase", "env_steps", "steps", "steps_per_second", "return_mean", "success_rate")
-        running = [{"cell": cell.name, **{name: found.get(name) for name in told}} for cell, found in self.running]
+        names = ("phase", "env_steps", "steps", "steps_per_second", "return_mean", "success_rate")
+        running = [{"cell": cell.name, **{name: found.get(name) for name in names}} for cell, found in self.running]
         return {
             "cells": self.cells,
             "ended": self.finished,

@@ -87,8 +87,8 @@ def public(path: Path) -> list[str]:
     body = ast.parse(path.read_text(encoding="utf-8")).body
     found = []
     for node, after in zip(body, [*body[1:], None], strict=True):
-        told = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
-        if told or isinstance(node, ast.ClassDef | ast.FunctionDef):
+        documented = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        if documented or isinstance(node, ast.ClassDef | ast.FunctionDef):
             found += [name for name in names_of(node) if name and not name.startswith("_")]
     return list(dict.fromkeys(found))
 
@@ -181,8 +181,8 @@ def tasks_in_motion(up: str = "") -> str:
     figures = []
     for task in built_in("tasks"):
         found = sorted((e for e in entries() if e["task"] == task), key=lambda e: order.get(e["method"], len(order)))
-        told = f"[{load_task(task).title}](docs/tasks/{task}.md): {lowered(asked(task))}"
-        figures.append(picture(found[0], f"{told}{former(found[0])}") if found else f"{told}\n")
+        caption = f"[{load_task(task).title}](docs/tasks/{task}.md): {lowered(asked(task))}"
+        figures.append(picture(found[0], f"{caption}{former(found[0])}") if found else f"{caption}\n")
     return cards(figures, up)
 
 
@@ -347,13 +347,13 @@ PARTS = {"claims": "claims", "checks_of_scenes": "checks of scenes"}
 
 def verdicts(study: Study) -> str:
     """Return how many claims of a study got which verdict, checks of scenes apart; or that nothing is shipped."""
-    told = []
+    outcomes = []
     for folder in shipped(study):
         judged = json.loads((folder / "claims" / "claims.json").read_text(encoding="utf-8"))
         for part, label in PARTS.items():
             counts = [f"{number} {v}" for v in VERDICTS if (number := sum(c["verdict"] == v for c in judged[part]))]
-            told += [f"{len(judged[part])} {label}: {', '.join(counts)}"] if judged[part] else []
-    return "; ".join(told) or "no results yet"
+            outcomes += [f"{len(judged[part])} {label}: {', '.join(counts)}"] if judged[part] else []
+    return "; ".join(outcomes) or "no results yet"
 
 
 def study_page(study: Study) -> str:

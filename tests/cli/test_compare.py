@@ -16,12 +16,12 @@ def test_two_folders_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[
             code = {"commit": name * 10, "fingerprint": name}
             store_cell(tmp_path / name, seed=seed, curve=rising(0.0, more + 0.1 * seed), code=code)
     assert main(["compare", str(tmp_path / "now"), str(tmp_path / "before")]) == 0
-    header, row, *told = capsys.readouterr().out.splitlines()
+    header, row, *notes = capsys.readouterr().out.splitlines()
     assert header.split()[:2] == ["task", "method"]
     assert header.endswith("adjusted p")
     assert row.split()[:8] == ["push", "gnn_ppo", "3,", "3", "1.10", "0.10", "+1.00", "[+0.77,"]
-    assert told[-1].startswith("commits: ")
-    assert "of now" in told[-1]
+    assert notes[-1].startswith("commits: ")
+    assert "of now" in notes[-1]
 
 
 def test_bad_input_is_told_in_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

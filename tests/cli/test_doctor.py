@@ -1,4 +1,4 @@
-"""`codesign-bench doctor` prints headings, and below each what is told."""
+"""`codesign-bench doctor` prints headings, with facts below each."""
 
 from __future__ import annotations
 

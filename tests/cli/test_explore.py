@@ -40,6 +40,6 @@ def test_bad_input_is_named_in_a_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["explore", "--results", str(VERSION_0_1_0), *arguments]) == 2
-    told = capsys.readouterr().err.strip()
-    assert named in told
+    message = capsys.readouterr().err.strip()
+    assert named in message
     assert not (tmp_path / "results").exists()

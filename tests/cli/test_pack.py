@@ -14,10 +14,10 @@ def test_an_archive_takes_the_place_of_its_folder(tmp_path: Path, capsys: pytest
     runs, out = tmp_path / "runs", tmp_path / "mine.zip"
     store_cell(runs, curve=rising(0.0, 1.0))
     assert main(["pack", str(runs), "--out", str(out)]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert told[0].startswith("1 cells, 0 policies, 3 files, ")
-    assert told[0].endswith("all checked")
-    assert told[1] == str(out)
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0].startswith("1 cells, 0 policies, 3 files, ")
+    assert printed[0].endswith("all checked")
+    assert printed[1] == str(out)
     assert main(["pack", str(runs), "--out", str(out)]) == 2
     assert "no archive is replaced" in capsys.readouterr().err
 

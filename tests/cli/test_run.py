@@ -23,8 +23,8 @@ def test_a_foreign_or_unwritable_folder_is_left_alone(tmp_path: Path, capsys: py
     assert main([*RUN, "--out", str(tmp_path)]) == 2
     assert main([*RUN, "--out", str(tmp_path / "thesis.tex")]) == 2
     assert main([*RUN, "--out", "/proc/runs"]) == 2
-    told = capsys.readouterr().err.strip().splitlines()
-    assert len(told) <= 6
+    printed = capsys.readouterr().err.strip().splitlines()
+    assert len(printed) <= 6
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
@@ -76,18 +76,18 @@ def test_a_program_can_follow_a_run(
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     line = [*RUN, "--seeds", "2", "--out", str(tmp_path / "runs"), "--json"]
     assert main([*line, "--dry-run"]) == 0
-    told = events(capsys.readouterr().out)
-    planned = [(event["cell"], event["state"]) for event in told if event["event"] == "planned"]
+    printed = events(capsys.readouterr().out)
+    planned = [(event["cell"], event["state"]) for event in printed if event["event"] == "planned"]
     assert planned == [(f"toy_reach/toy_search/default/seed-0{seed}", "run") for seed in range(2)]
-    (plan,) = [event for event in told if event["event"] == "plan"]
+    (plan,) = [event for event in printed if event["event"] == "plan"]
     assert (plan["cells"], plan["to_run"], plan["steps"]) == (2, 2, 200)
     assert plan["expected_seconds"] > 0.0
     assert main(line) == 0
-    told = events(capsys.readouterr().out)
-    assert [event["to_run"] for event in told if event["event"] == "begin"] == [2]
-    ended = [event for event in told if event["event"] == "cell"]
+    printed = events(capsys.readouterr().out)
+    assert [event["to_run"] for event in printed if event["event"] == "begin"] == [2]
+    ended = [event for event in printed if event["event"] == "cell"]
     assert [(event["status"], event["env_steps"] >= 100) for event in ended] == [("done", True)] * 2
-    assert told[-1] | {"time": ""} == {
+    assert printed[-1] | {"time": ""} == {
         "event": "end",
         "time": "",
         "exit_code": 0,

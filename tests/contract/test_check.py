@@ -1,4 +1,4 @@
-"""A check: verdicts, errors that become faults, and what is told of them."""
+"""A check: verdicts, errors that become faults, and what is shown of them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_an_error_is_a_fault_beside_those_found_before() -> None:
     assert second.found.startswith("it raised ZeroDivisionError: seven (test_check.py, line ")
 
 
-def test_only_the_first_faults_are_told() -> None:
+def test_only_the_first_faults_are_shown() -> None:
     assert len(ask(even, 200).faults) == MOST_FAULTS
 
 

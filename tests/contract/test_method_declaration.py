@@ -11,7 +11,7 @@ from codesign_bench import registry
 from codesign_bench.contract import Check, Subject, ask
 from codesign_bench.contract import method_declaration as checks
 from codesign_bench.method import Method, load_method, method_names
-from contract_faults import TellFaults, told
+from contract_faults import FaultsOf, text_of
 from sound import SoundSearch, changed_method
 
 
@@ -60,12 +60,12 @@ class Unfinished(SoundSearch):
     ],
 )
 def test_what_is_wrong_is_found(
-    method_faults: TellFaults, check: Check[Subject], changes: dict[str, Any], found: str
+    method_faults: FaultsOf, check: Check[Subject], changes: dict[str, Any], found: str
 ) -> None:
     assert found in method_faults(check, **changes)
 
 
-def test_a_label_that_another_method_has_is_found(method_faults: TellFaults) -> None:
+def test_a_label_that_another_method_has_is_found(method_faults: FaultsOf) -> None:
     other = method_names()[0]
     found = method_faults(checks.label_is_its_own, label=load_method(other).label)
     assert f"is the label of {other}, too" in found
@@ -84,4 +84,4 @@ def test_a_method_that_cannot_be_used_says_what_is_missing(
     toy: None, method_class: type[Method[Any]], found: str
 ) -> None:
     registry.register("methods", "asked", lambda: method_class)
-    assert found in told(ask(checks.loads, "asked"))
+    assert found in text_of(ask(checks.loads, "asked"))

@@ -12,7 +12,7 @@ from codesign_bench.contract import method_policy as checks
 from codesign_bench.errors import UserError
 from codesign_bench.method import Array, Method, Policy
 from codesign_bench.task import Singles
-from contract_faults import TellFaults
+from contract_faults import FaultsOf
 from sound import SoundSearch
 from toy import ConstantPolicy
 
@@ -112,6 +112,6 @@ def refusing(self: SoundSearch, tensors: dict[str, Array]) -> None:
     ],
 )
 def test_what_is_wrong_is_found(
-    method_faults: TellFaults, check: Check[Subject], changes: dict[str, Any], found: str
+    method_faults: FaultsOf, check: Check[Subject], changes: dict[str, Any], found: str
 ) -> None:
     assert found in method_faults(check, **changes)

@@ -9,7 +9,7 @@ import pytest
 
 from codesign_bench.contract.method_resuming import resumes_to_the_bit
 from codesign_bench.method import BatchReport, State
-from contract_faults import TellFaults
+from contract_faults import FaultsOf
 from sound import SoundSearch
 
 
@@ -47,5 +47,5 @@ def hidden(self: SoundSearch, remaining_steps: int) -> BatchReport:
         ({"train": hidden}, "batch 0 after resuming reports something else"),
     ],
 )
-def test_what_a_checkpoint_loses_is_found(method_faults: TellFaults, changes: dict[str, Any], found: str) -> None:
+def test_what_a_checkpoint_loses_is_found(method_faults: FaultsOf, changes: dict[str, Any], found: str) -> None:
     assert found in method_faults(resumes_to_the_bit, **changes)

@@ -14,7 +14,7 @@ import torch
 from codesign_bench.contract import Check, Subject
 from codesign_bench.contract import method_training as checks
 from codesign_bench.method import BatchReport, Policy
-from contract_faults import TellFaults
+from contract_faults import FaultsOf
 from sound import SoundSearch
 from toy import ConstantPolicy
 
@@ -27,8 +27,8 @@ def after(change: Callable[[SoundSearch, BatchReport], Any]) -> dict[str, Any]:
 
     def train(self: SoundSearch, remaining_steps: int) -> BatchReport:
         report = SoundSearch.train(self, remaining_steps)
-        told = change(self, report)
-        return told if isinstance(told, BatchReport) else report
+        changed = change(self, report)
+        return changed if isinstance(changed, BatchReport) else report
 
     return {"train": train}
 
@@ -77,6 +77,6 @@ def unseeded(self: SoundSearch, report: BatchReport) -> None:
     ],
 )
 def test_what_is_wrong_is_found(
-    method_faults: TellFaults, check: Check[Subject], changes: dict[str, Any], found: str
+    method_faults: FaultsOf, check: Check[Subject], changes: dict[str, Any], found: str
 ) -> None:
     assert found in method_faults(check, **changes)

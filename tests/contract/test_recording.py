@@ -1,4 +1,4 @@
-"""Recorded episodes: what follows an end is zero, and the first difference is told."""
+"""Recorded episodes: what follows an end is zero, and the first difference is named."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_a_recording_by_hand() -> None:
     assert played.one(1).reward.shape == (3, 1)
 
 
-def test_the_first_difference_is_told() -> None:
+def test_the_first_difference_is_named() -> None:
     script = random_script(TASK)
     first, second = (record(Episodes(TASK, EPISODES), script, np.arange(EPISODES)) for _ in range(2))
     assert difference(TASK, first, second) == ""

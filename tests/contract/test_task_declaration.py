@@ -11,7 +11,7 @@ from codesign_bench import registry
 from codesign_bench.contract import Check, ask
 from codesign_bench.contract import task_declaration as checks
 from codesign_bench.task import Box, Constant, PlanarPart, Task, ToolGraph
-from contract_faults import TellFaults, told
+from contract_faults import FaultsOf, text_of
 from sound import SoundReach, changed_task
 
 
@@ -49,9 +49,7 @@ from sound import SoundReach, changed_task
         (checks.tool_parts_follow_the_design, {"tool_parts": Task.tool_parts}, "it does not define `tool_parts`"),
     ],
 )
-def test_what_is_wrong_is_found(
-    task_faults: TellFaults, check: Check[Task], changes: dict[str, Any], found: str
-) -> None:
+def test_what_is_wrong_is_found(task_faults: FaultsOf, check: Check[Task], changes: dict[str, Any], found: str) -> None:
     assert found in task_faults(check, **changes)
 
 
@@ -69,7 +67,7 @@ def test_what_is_wrong_is_found(
 )
 def test_a_task_that_cannot_be_used_says_what_is_missing(toy: None, task_class: type[Task], found: str) -> None:
     registry.register("tasks", "asked", lambda: task_class)
-    assert found in told(ask(checks.loads, "asked"))
+    assert found in text_of(ask(checks.loads, "asked"))
 
 
 def test_all_corners_of_few_entries_and_some_of_many() -> None:

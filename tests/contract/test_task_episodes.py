@@ -11,7 +11,7 @@ import pytest
 from codesign_bench.contract import Check
 from codesign_bench.contract import task_episodes as checks
 from codesign_bench.task import Box, Floats, Slots, Task
-from contract_faults import TellFaults
+from contract_faults import FaultsOf
 from sound import Sticks
 
 calls = count()
@@ -72,13 +72,11 @@ def broken(self: Sticks, slots: Slots, controls: Floats) -> None:
         (checks.designs_and_controls_matter, {"simulator": {"step": no_control}}, "opposite controls changed no state"),
     ],
 )
-def test_what_is_wrong_is_found(
-    task_faults: TellFaults, check: Check[Task], changes: dict[str, Any], found: str
-) -> None:
+def test_what_is_wrong_is_found(task_faults: FaultsOf, check: Check[Task], changes: dict[str, Any], found: str) -> None:
     assert found in task_faults(check, **changes)
 
 
-def test_gymnasium_is_asked(task_faults: TellFaults) -> None:
+def test_gymnasium_is_asked(task_faults: FaultsOf) -> None:
     def restless(self: Task, rng: np.random.Generator, count: int) -> Floats:
         return np.random.default_rng(next(calls)).uniform(size=(count, 1))
 

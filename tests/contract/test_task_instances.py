@@ -12,7 +12,7 @@ import pytest
 from codesign_bench.contract import Check
 from codesign_bench.contract import task_instances as checks
 from codesign_bench.task import Floats, Task
-from contract_faults import TellFaults
+from contract_faults import FaultsOf
 
 calls = count()
 
@@ -79,13 +79,11 @@ def drawn(draw: Callable[[np.random.Generator, int], Floats]) -> dict[str, Any]:
         ),
     ],
 )
-def test_what_is_wrong_is_found(
-    task_faults: TellFaults, check: Check[Task], changes: dict[str, Any], found: str
-) -> None:
+def test_what_is_wrong_is_found(task_faults: FaultsOf, check: Check[Task], changes: dict[str, Any], found: str) -> None:
     assert found in task_faults(check, **changes)
 
 
-def test_a_changed_distribution_outside_of_the_cutout_is_found(task_faults: TellFaults) -> None:
+def test_a_changed_distribution_outside_of_the_cutout_is_found(task_faults: FaultsOf) -> None:
     def sample(self: Task, rng: np.random.Generator, count: int) -> Floats:
         """Draw higher goals when only a few are asked for, as when those in the cutout are drawn again."""
         return rng.uniform(size=(count, 1)) ** (1.0 if count == checks.SAMPLES else 0.3)

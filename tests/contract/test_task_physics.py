@@ -10,7 +10,7 @@ import pytest
 from codesign_bench.contract import Check
 from codesign_bench.contract import task_physics as checks
 from codesign_bench.task import Booleans, Floats, Frame, Physics, Slots, Soundness, Task
-from contract_faults import TellFaults
+from contract_faults import FaultsOf
 from sound import Sticks
 
 
@@ -65,7 +65,5 @@ def touching(self: Sticks, slot: int) -> Frame:
         ),
     ],
 )
-def test_what_is_wrong_is_found(
-    task_faults: TellFaults, check: Check[Task], changes: dict[str, Any], found: str
-) -> None:
+def test_what_is_wrong_is_found(task_faults: FaultsOf, check: Check[Task], changes: dict[str, Any], found: str) -> None:
     assert found in task_faults(check, **{"horizon": 12, "name": "sound_reach", **changes})

@@ -10,7 +10,7 @@ import pytest
 from codesign_bench.contract import Check
 from codesign_bench.contract import task_rewards as checks
 from codesign_bench.task import Floats, Slots, Task
-from contract_faults import TellFaults
+from contract_faults import FaultsOf
 from sound import Sticks
 
 
@@ -63,7 +63,5 @@ def remembering(self: Sticks, slots: Slots, instances: Floats) -> None:
         (checks.new_episodes_forget, {"simulator": {"begin": remembering}}, "not zero: reward, "),
     ],
 )
-def test_what_is_wrong_is_found(
-    task_faults: TellFaults, check: Check[Task], changes: dict[str, Any], found: str
-) -> None:
+def test_what_is_wrong_is_found(task_faults: FaultsOf, check: Check[Task], changes: dict[str, Any], found: str) -> None:
     assert found in task_faults(check, **changes)

@@ -9,7 +9,7 @@ from codesign_bench.contract import Check
 from codesign_bench.contract import task_script as checks
 from codesign_bench.task import Floats, Singles, Slots, Task
 from codesign_bench.task.behaviours import Idle
-from contract_faults import TellFaults
+from contract_faults import FaultsOf
 from sound import Script, Sticks
 
 
@@ -51,12 +51,12 @@ def no_tool(self: Sticks, slots: Slots, designs: Floats) -> None:
     ],
 )
 def test_what_is_no_function_of_an_observation_is_found(
-    task_faults: TellFaults, script: type[Script], found: str
+    task_faults: FaultsOf, script: type[Script], found: str
 ) -> None:
     assert found in task_faults(checks.script_is_a_function, script=lambda self: script())
 
 
-def test_a_script_that_solves_nothing_is_found(task_faults: TellFaults) -> None:
+def test_a_script_that_solves_nothing_is_found(task_faults: FaultsOf) -> None:
     found = task_faults(
         checks.script_solves_some, script=lambda self: Idle(self), in_goal=None, sample_instances=far_goals
     )
@@ -68,11 +68,11 @@ def far_goals(self: Task, rng: np.random.Generator, count: int) -> Floats:
     return rng.uniform(0.9, 1.0, size=(count, 1))
 
 
-def test_tools_that_change_nothing_are_found(task_faults: TellFaults) -> None:
+def test_tools_that_change_nothing_are_found(task_faults: FaultsOf) -> None:
     assert "random tools all reach" in task_faults(checks.script_solves_some, simulator={"build": no_tool})
 
 
-def test_a_reward_for_not_solving_is_found(task_faults: TellFaults) -> None:
+def test_a_reward_for_not_solving_is_found(task_faults: FaultsOf) -> None:
     def late(self: Sticks, slots: Slots, controls: Floats) -> None:
         Sticks.step(self, slots, controls)
         self.success[slots] = self.goal[slots] < 0.5
@@ -84,5 +84,5 @@ def test_a_reward_for_not_solving_is_found(task_faults: TellFaults) -> None:
 
 
 @pytest.mark.parametrize("check", [checks.script_solves_some, checks.script_is_a_function])
-def test_a_task_may_do_without_a_script(task_faults: TellFaults, check: Check[Task]) -> None:
+def test_a_task_may_do_without_a_script(task_faults: FaultsOf, check: Check[Task]) -> None:
     assert task_faults(check, script=Task.script) == "it has no script"

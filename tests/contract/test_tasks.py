@@ -1,4 +1,4 @@
-"""All checks of a task: a sound task passes every one, and what is wrong first is told first."""
+"""All checks of a task: a sound task passes every one, and what is wrong first comes first."""
 
 from __future__ import annotations
 

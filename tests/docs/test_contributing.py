@@ -58,15 +58,15 @@ def test_the_page_writes_out_a_package_and_its_commands() -> None:
 
 def test_the_commands_of_the_page_run_as_written(package: Path, environment: dict[str, str]) -> None:
     installed, imported = contributing.commands()
-    told = run(installed, package, environment)
-    assert "2 of 2 keep the contract" in told
-    assert "all 2 cells done" in told
-    figure = package / told.splitlines()[-1]
+    printed = run(installed, package, environment)
+    assert "2 of 2 keep the contract" in printed
+    assert "all 2 cells done" in printed
+    figure = package / printed.splitlines()[-1]
     assert figure.name == "learning_curves.png"
     assert figure.stat().st_size > 0
     # Without the installed package: only what is named on the command line is found.
-    told = run(imported, package, {**environment, "PYTHONPATH": ""})
-    assert "task touch: " in told
-    assert " wrong" not in told
-    assert "2 of them already done" in told
-    assert "all 3 cells done" in told
+    printed = run(imported, package, {**environment, "PYTHONPATH": ""})
+    assert "task touch: " in printed
+    assert " wrong" not in printed
+    assert "2 of them already done" in printed
+    assert "all 3 cells done" in printed

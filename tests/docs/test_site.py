@@ -77,7 +77,7 @@ def test_what_is_no_page_is_shown_by_one_and_pictures_are_copied(site: Site) -> 
     assert "- `timing_table.py`" in (site.out / "source/paper_figs.md").read_text(encoding="utf-8")
 
 
-def test_a_link_to_nothing_is_told(site: Site) -> None:
+def test_a_link_to_nothing_is_reported(site: Site) -> None:
     with pytest.raises(FileNotFoundError, match=r"docs/tasks/push\.md links to gone\.md"):
         site.with_links("[a](gone.md)", "docs/tasks/push.md", "tasks/push.md")
 
@@ -195,7 +195,7 @@ def test_a_page_of_a_task_moves() -> None:
     assert text.index("push_gnn_ppo.gif") < text.index("## Action")
 
 
-def test_faults_of_a_built_site_are_told(tmp_path: Path) -> None:
+def test_faults_of_a_built_site_are_reported(tmp_path: Path) -> None:
     (tmp_path / "b.html").write_text('<h2 id="there">B</h2>', encoding="utf-8")
     (tmp_path / "a.html").write_text(
         '<a href="b.html#there">1</a><a href="b.html#gone">2</a><a href="c.html">3</a><img src="x.png">'

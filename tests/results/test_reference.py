@@ -42,6 +42,8 @@ FIRST = [next(group) for _, group in groupby(DEFAULTS, lambda cell: (cell.record
 PLAYABLE = [cell for cell in FIRST if (cell.folder / POLICY_FILE).exists()]
 CREDIT = "design_credit: stored separate, requested joint"
 """The default that changed since the cells were run, as the page of the results says."""
+SEARCHED = {("push", "cma_es"): ("popsize", "sigma0", "episodes_per_candidate")}
+"""Settings that the common search has found since."""
 FIRST_TRIALS = load_deployment(REFERENCE).query("kind == 'own' and trial == 1 and success == 1")
 TOOLS_THAT_WORKED = FIRST_TRIALS.groupby("task")[["task", "tool"]].tail(1).values.tolist()
 """Of each task on an arm, one tool that succeeded in its first trial."""
@@ -150,11 +152,14 @@ def test_the_evaluation_of_a_shipped_cell_is_the_end_of_its_curve() -> None:
 
 
 @pytest.mark.parametrize("cell", FIRST, ids=name_of)
-def test_the_profile_of_a_shipped_cell_still_means_what_it_was_run_with_but_for_the_credit(cell: StoredCell) -> None:
+def test_the_profile_of_a_shipped_cell_still_means_what_it_was_but_for_stated_changes(
+    cell: StoredCell,
+) -> None:
     skip_if_its_task_has_changed(cell)
     record = cell.record
     wanted = Cell(record.task, record.method, record.seed, record.variant, record.profile)
     found = differences(record.config, resolve_cell(wanted).config)
+    found = [line for line in found if line.split(":")[0] not in SEARCHED.get((record.task, record.method), ())]
     assert found in ([], [CREDIT])
     has_other_credit = resolve_cell(wanted).config.stored().parts["method"].get("design_credit")
     assert (found == [CREDIT]) == (has_other_credit is not None and has_other_credit.value == "joint")

@@ -58,11 +58,11 @@ def test_the_table_and_the_lines_below_it(two: tuple[Path, Path]) -> None:
     assert first[:6] == ("push", "gnn_ppo", "3, 3", "2.10", "1.10", "+1.00 [+0.77, +1.23]")
     assert first[-1].endswith("(2)")
     assert average[0] == "average of 2 tasks"
-    told = notes(found)
-    assert told[0].startswith(f"A is {two[0]}, B is {two[1]}")
-    assert "only in A: cma_es on lift_cup (version 1)" in told
-    assert "only in B: cma_es on lift_cup (version 2)" in told
-    assert told[-1] == "commits: not recorded (all 14 cells)"
+    lines = notes(found)
+    assert lines[0].startswith(f"A is {two[0]}, B is {two[1]}")
+    assert "only in A: cma_es on lift_cup (version 1)" in lines
+    assert "only in B: cma_es on lift_cup (version 2)" in lines
+    assert lines[-1] == "commits: not recorded (all 14 cells)"
 
 
 def test_other_budgets_are_told(two: tuple[Path, Path]) -> None:

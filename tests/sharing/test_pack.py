@@ -36,9 +36,9 @@ def runs(tmp_path: Path) -> Path:
 
 
 def test_an_archive_describes_itself(runs: Path, tmp_path: Path) -> None:
-    out, told = tmp_path / "mine.zip", list[str]()
+    out, printed = tmp_path / "mine.zip", list[str]()
     order = Order(by="me", note="a note", tuning=["by hand", "12000"])
-    manifest = pack(runs, out, order, told.append)
+    manifest = pack(runs, out, order, printed.append)
     assert manifest == check_archive(out)
     assert (manifest.title, manifest.by, manifest.note, manifest.cells) == ("runs", "me", "a note", 3)
     assert manifest.code[0] == {**CODE, "cells": 2}
@@ -46,7 +46,7 @@ def test_an_archive_describes_itself(runs: Path, tmp_path: Path) -> None:
     assert manifest.packed_by["version"]
     assert manifest.tuning_note == "by hand; 12,000 steps"
     assert {"reference_points.csv", "design_sensitivity/push.csv"} <= set(manifest.files)
-    assert told == [
+    assert printed == [
         "left out: push/gnn_ppo/default/seed-03/curve.csv: it is missing, although the cell is done",
         "left out: push/gnn_ppo/default/seed-02: it is interrupted",
     ]

@@ -63,8 +63,8 @@ def contents(path: Path) -> dict[str, bytes]:
 
 def manifest_with(files: Mapping[str, bytes], **changes: Any) -> bytes:
     """Return the content of a manifest of these files."""
-    told = {name: StoredFile(len(data), hashlib.sha256(data).hexdigest()) for name, data in files.items()}
-    return json.dumps({**Manifest(files=told).to_json(), **changes}).encode()
+    listed = {name: StoredFile(len(data), hashlib.sha256(data).hexdigest()) for name, data in files.items()}
+    return json.dumps({**Manifest(files=listed).to_json(), **changes}).encode()
 
 
 def test_what_is_packed_comes_back_byte_for_byte(runs: Path, archive: Path, tmp_path: Path) -> None:
@@ -83,7 +83,7 @@ def test_the_same_results_give_the_same_bytes(runs: Path, archive: Path, tmp_pat
 
 
 def test_a_manifest_is_read_as_it_was_written() -> None:
-    told = Manifest(
+    manifest = Manifest(
         title="a",
         by="b",
         note="c",
@@ -97,7 +97,7 @@ def test_a_manifest_is_read_as_it_was_written() -> None:
         tuning_steps={"push": {"cma_es": 7}},
         files={CURVE: StoredFile(3, "0f")},
     )
-    assert Manifest.from_json(json.loads(json.dumps(told.to_json()))) == told
+    assert Manifest.from_json(json.loads(json.dumps(manifest.to_json()))) == manifest
 
 
 def test_an_unpacked_archive_is_only_read(archive: Path, tmp_path: Path) -> None:
@@ -171,7 +171,7 @@ def outside(path: Path) -> None:
 
 
 def absolute(path: Path) -> None:
-    files = {"/tmp/escaped.csv": b"x"}
+    files = {(path.parent / "escaped.csv").resolve().as_posix(): b"x"}
     rewritten(path, {**files, ARCHIVE_FILE: manifest_with(files)})
 
 
@@ -210,8 +210,8 @@ def newer(path: Path) -> None:
 
 
 def too_large_in_words(path: Path) -> None:
-    told = {CURVE: StoredFile(2**40, "0")}
-    rewritten(path, {CURVE: b"", ARCHIVE_FILE: json.dumps(replace(Manifest(), files=told).to_json()).encode()})
+    listed = {CURVE: StoredFile(2**40, "0")}
+    rewritten(path, {CURVE: b"", ARCHIVE_FILE: json.dumps(replace(Manifest(), files=listed).to_json()).encode()})
 
 
 def other_compression(path: Path) -> None:
@@ -268,7 +268,6 @@ def test_what_pack_did_not_write_is_refused_in_a_line(
     with pytest.raises(UnusableFile):
         check_archive(archive)
     assert not list(tmp_path.rglob("escaped.csv"))
-    assert not Path("/tmp/escaped.csv").exists()
 
 
 def test_a_file_that_says_it_is_smaller_than_it_is_fills_no_memory(archive: Path, tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from played_alike import assert_plays_as_stored
 
 SETTINGS = "batch_size=600 minibatch_size=150 epochs=2 design_epochs=2 popsize=4 episodes_per_candidate=1"
 SETTINGS += " policy_net=16,16 value_net=16,16 control_gnn=16,16 control_index_mlp=16 design_gnn=16,16"
-SETTINGS += " design_index_mlp=16 value_mlp=16 evaluations=2 design_credit=separate"
+SETTINGS += " design_index_mlp=16 value_mlp=16 evaluations=2 design_credit=separate cma_es.sigma0=0.3"
 """With which the folder was made, by 1,200 steps of the profile `quick`."""
 GNN_PPO = "batch_size=600 minibatch_size=150 epochs=2 design_epochs=2 control_gnn=16,16 control_index_mlp=16"
 GNN_PPO += " design_gnn=16,16 design_index_mlp=16 value_mlp=16 evaluations=2 design_credit=separate"

@@ -28,12 +28,12 @@ def test_progress_adds_up_the_running_cells(tmp_path: Path) -> None:
     assert ([cell for cell, _ in found.running], found.finished, found.cells) == ([one], 0, 2)
     assert found.seconds_left == pytest.approx((100 + 200) / 50.0)
     assert found.line() == "0/2 cells ended, 1 running, 50 steps/s, about 6 s left"
-    told = found.to_json()
-    assert told["running"][0] | {"phase": ""} == {
+    event = found.to_json()
+    assert event["running"][0] | {"phase": ""} == {
         **{"cell": one.name, "phase": "", "env_steps": 100, "steps": 200, "steps_per_second": 50.0},
         **{"return_mean": None, "success_rate": None},
     }
-    assert told["seconds_left"] == found.seconds_left
+    assert event["seconds_left"] == found.seconds_left
     write_json(one.folder(tmp_path) / PROGRESS_FILE, {**content, "updated": 0.0})
     assert display.snapshot().running == []
     display.ended(one)

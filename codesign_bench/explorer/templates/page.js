@@ -224,10 +224,10 @@ const page = (() => {
     const solved = panel.cell.success[nearest] ? "solved" : "not solved";
     const same = task.axes.every((axis, i) => Math.abs(task.points[nearest][i] - point[i]) < 1e-9 * (1 + Math.abs(point[i])));
     const where = same ? "The recorded episode of this goal" : `The nearest recorded goal, ${place(task.points[nearest])},`;
-    const told = live
+    const message = live
       ? `${where}: ${solved} in ${panel.cell.lengths[nearest]} control steps, return ${number(panel.cell.returns[nearest])}.`
       : `Shown: ${same ? "the recorded episode of this goal" : `the recorded episode of the nearest goal, ${place(task.points[nearest])}`}, ${solved}.`;
-    if (part(panel, "status").textContent !== told) part(panel, "status").textContent = told;
+    if (part(panel, "status").textContent !== message) part(panel, "status").textContent = message;
   }
 
   function toolOf(cell, design, nearest) {

@@ -21,7 +21,8 @@ from codesign_bench.errors import UserError
 from codesign_bench.registry import in_order
 from codesign_bench.sharing.finals import Finals, Scales, finals_of
 from codesign_bench.stats import MIN_SEEDS, Estimate, mean_across, mean_t_interval
-from codesign_bench.storage.archive import SUFFIX, Manifest, read_manifest
+from codesign_bench.storage.archive import SUFFIX, read_manifest
+from codesign_bench.storage.manifest import Manifest
 from codesign_bench.storage.places import unpacked
 from codesign_bench.storage.provenance import NOT_RECORDED, SHORT
 from codesign_bench.storage.reference_points import stored_references

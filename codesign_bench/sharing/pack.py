@@ -14,10 +14,11 @@ from codesign_bench.cell.variant import DEFAULT
 from codesign_bench.code_version import code_version
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
-from codesign_bench.storage.archive import LONGEST_NOTE, SUFFIX, Manifest, files_in, limit_of, write_archive
+from codesign_bench.storage.archive import SUFFIX, files_in, limit_of, write_archive
 from codesign_bench.storage.cells import StoredCell, find_cells, scan
 from codesign_bench.storage.files import saying_why
 from codesign_bench.storage.layout import CURVE_FILE, EVALUATION_FILE, MARKER_FILE, POLICY_FILE
+from codesign_bench.storage.manifest import LONGEST_NOTE, Manifest
 from codesign_bench.storage.records import CELL_FILE, CellRecord
 from codesign_bench.storage.reference_points import FILE as REFERENCE_POINTS_FILE
 from codesign_bench.storage.survey import lines, survey

@@ -16,15 +16,14 @@ import struct
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from codesign_bench.storage.files import json_bytes, reason_of, replacing
-from codesign_bench.storage.json_fields import entries, optional, text, whole
 from codesign_bench.storage.layout import (
     ARCHIVE_FILE,
     CURVE_FILE,
@@ -33,6 +32,7 @@ from codesign_bench.storage.layout import (
     METRICS_FILE,
     POLICY_FILE,
 )
+from codesign_bench.storage.manifest import SCHEMA, Manifest, StoredFile
 from codesign_bench.storage.measurements import ALL
 from codesign_bench.storage.reading import (
     JSON_BYTES,
@@ -48,8 +48,6 @@ from codesign_bench.storage.records import CELL_FILE
 from codesign_bench.storage.tables import TABLE_BYTES
 
 SUFFIX = ".zip"
-SCHEMA = 1
-CONTENT = "results of codesign-bench"
 POLICY_BYTES = 256 * MEGABYTE
 """As large as a file of arrays may be."""
 ARCHIVE_BYTES, UNPACKED_BYTES = 1024 * MEGABYTE, 2048 * MEGABYTE
@@ -58,8 +56,8 @@ MOST_FILES = 60_000
 """Fewer than an archive may list without the extension to 64 bits, which is refused."""
 LISTING_BYTES = 16 * MEGABYTE
 """Largest list of files at the end of an archive."""
-LONGEST_NAME, LONGEST_NOTE = 500, 2_000
-"""Characters of a file's path, and of a text that the author wrote."""
+LONGEST_NAME = 500
+"""Characters of a file's path."""
 PIECE = 2**20
 """Bytes that are read at once."""
 
@@ -89,88 +87,6 @@ FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 FAULTS = (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, NotImplementedError, EOFError)
 """Exceptions of reading a damaged zip file or manifest; `zipfile` also raises these."""
 DAMAGED_ZIP = (zipfile.BadZipFile, zipfile.LargeZipFile, zlib.error, struct.error, RuntimeError, *FAULTS)
-
-
-@dataclass(frozen=True)
-class StoredFile:
-    """What a file of an archive must be."""
-
-    size: int
-    """Bytes."""
-    sha256: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Manifest:
-    """What an archive says of itself."""
-
-    title: str = ""
-    by: str = ""
-    """Who submits it."""
-    note: str = ""
-    ended: str = ""
-    """When the last of its cells ended, UTC, ISO 8601."""
-    cells: int = 0
-    policies: int = 0
-    """Number of cells with a policy."""
-    packed_by: Mapping[str, Any] = field(default_factory=dict)
-    """The code that wrote the archive: version, commit, whether files differ from it, fingerprint."""
-    code: tuple[Mapping[str, Any], ...] = ()
-    """The codes that ran the cells, likewise, each with its number of `cells`."""
-    versions: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
-    """Package -> its versions, each with its number of cells."""
-    tuning_note: str = ""
-    """How the settings were found, in the author's words."""
-    tuning_steps: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
-    """Task -> method -> environment steps that were spent on finding its settings, as far as they are known."""
-    files: Mapping[str, StoredFile] = field(default_factory=dict)
-    """Path of every other file -> what it must be."""
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the manifest as JSON values."""
-        return {
-            "schema": SCHEMA,
-            "content": CONTENT,
-            "title": self.title,
-            "by": self.by,
-            "note": self.note,
-            "ended": self.ended,
-            "cells": self.cells,
-            "policies": self.policies,
-            "packed_by": dict(self.packed_by),
-            "code": [dict(code) for code in self.code],
-            "versions": {name: dict(counts) for name, counts in self.versions.items()},
-            "tuning": {"note": self.tuning_note, "env_steps": {t: dict(m) for t, m in self.tuning_steps.items()}},
-            "files": {name: {"bytes": file.size, "sha256": file.sha256} for name, file in self.files.items()},
-        }
-
-    @classmethod
-    def from_json(cls, content: Mapping[str, Any]) -> Manifest:
-        """Return the manifest that `to_json` wrote.
-
-        Raises:
-            ValueError, KeyError, TypeError, AttributeError: `content` is not a manifest.
-        """
-        if content["schema"] != SCHEMA or content["content"] != CONTENT:
-            raise ValueError("it is not the manifest of an archive")
-        tuning = optional(entries, content, "tuning") or {}
-        code = content.get("code") or []
-        if not isinstance(code, list) or not all(isinstance(part, dict) for part in code):
-            raise ValueError("'code' is not a list of objects")
-        return cls(
-            title=_optional_text(content, "title"),
-            by=_optional_text(content, "by"),
-            note=_optional_text(content, "note"),
-            ended=_optional_text(content, "ended"),
-            cells=optional(whole, content, "cells") or 0,
-            policies=optional(whole, content, "policies") or 0,
-            packed_by=optional(entries, content, "packed_by") or {},
-            code=tuple(code),
-            versions=_counts(optional(entries, content, "versions") or {}),
-            tuning_note=_optional_text(tuning, "note"),
-            tuning_steps=_counts(optional(entries, tuning, "env_steps") or {}),
-            files=_files(entries(content, "files")),
-        )
 
 
 def is_archive(folder: Path) -> bool:
@@ -435,20 +351,3 @@ def _entry(name: str) -> zipfile.ZipInfo:
     entry.compress_type, entry.create_system = zipfile.ZIP_DEFLATED, 3
     entry.external_attr = (stat.S_IFREG | 0o644) << 16
     return entry
-
-
-def _optional_text(content: Mapping[str, Any], name: str) -> str:
-    """Return a text that the author may have written, or an empty one."""
-    return text(content, name, most=LONGEST_NOTE) if content.get(name) is not None else ""
-
-
-def _counts(content: Mapping[str, Any]) -> dict[str, dict[str, int]]:
-    """Return names -> names -> numbers."""
-    return {name: {key: whole(entries(content, name), key) for key in entries(content, name)} for name in content}
-
-
-def _files(content: Mapping[str, Any]) -> dict[str, StoredFile]:
-    return {
-        name: StoredFile(whole(entries(content, name), "bytes"), text(entries(content, name), "sha256"))
-        for name in content
-    }

@@ -21,8 +21,6 @@ from codesign_bench.storage.archive import (
     ARCHIVE_FILE,
     IN_A_CELL,
     MOST_FILES,
-    Manifest,
-    StoredFile,
     check_archive,
     files_in,
     is_archive,
@@ -32,6 +30,7 @@ from codesign_bench.storage.archive import (
     write_archive,
 )
 from codesign_bench.storage.layout import open_folder
+from codesign_bench.storage.manifest import Manifest, StoredFile
 from codesign_bench.storage.reading import UnusableFile
 
 CELL = "push/gnn_ppo/default/seed-00"
@@ -80,24 +79,6 @@ def test_what_is_packed_comes_back_byte_for_byte(runs: Path, archive: Path, tmp_
 def test_the_same_results_give_the_same_bytes(runs: Path, archive: Path, tmp_path: Path) -> None:
     write_archive(tmp_path / "again.zip", runs, files_in(runs, [CELL]), Manifest(title="mine"))
     assert (tmp_path / "again.zip").read_bytes() == archive.read_bytes()
-
-
-def test_a_manifest_is_read_as_it_was_written() -> None:
-    manifest = Manifest(
-        title="a",
-        by="b",
-        note="c",
-        ended="2026-01-01",
-        cells=2,
-        policies=1,
-        packed_by={"commit": "d"},
-        code=({"commit": "e", "cells": 2},),
-        versions={"numpy": {"2.0": 2}},
-        tuning_note="f",
-        tuning_steps={"push": {"cma_es": 7}},
-        files={CURVE: StoredFile(3, "0f")},
-    )
-    assert Manifest.from_json(json.loads(json.dumps(manifest.to_json()))) == manifest
 
 
 def test_an_unpacked_archive_is_only_read(archive: Path, tmp_path: Path) -> None:

@@ -12,9 +12,10 @@ import codesign_bench as cb
 from builders import VERSION_0_1_0, rising, store_cell
 from codesign_bench.errors import UserError
 from codesign_bench.storage import places
-from codesign_bench.storage.archive import Manifest, files_in, write_archive
+from codesign_bench.storage.archive import files_in, write_archive
 from codesign_bench.storage.cells import open_cell, scan
 from codesign_bench.storage.layout import open_folder
+from codesign_bench.storage.manifest import Manifest
 from codesign_bench.storage.places import INSTALL, cell_folder, reference_folder, results_folder, shown
 
 CELL = "push/gnn_ppo/default/seed-00"

@@ -1,8 +1,9 @@
 """The tables of headroom beside the cells: what other tools earn with a finished cell's controller, per instance.
 
 OUT/headroom/<task>-<method>[-<variant>]-seed-00.csv        one row per evaluation instance, with the form `HEADROOM`
-OUT/design_values/<task>-<method>[-<variant>]-seed-00.csv   with the form `DESIGN_VALUES`: one row per tool and
-                                                            instance, of policies that judge designs themselves
+OUT/design_values/<task>-<method>[-<variant>]-seed-00.csv   one row per tool and instance, with the form `DESIGN_VALUES`
+
+The second is of policies that judge designs themselves.
 
 Rows are added one by one as they are measured and never replaced, also if several processes measure one cell.
 """

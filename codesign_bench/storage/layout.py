@@ -1,13 +1,15 @@
 """The layout of a results folder: names of files, the marker file, and what a killed process leaves behind.
 
-OUT/codesign-bench.json                                  marks a results folder
-OUT/archive.json                                         marks an unpacked archive, which is only read
-OUT/<task>/<method>/<variant>/seed-00/cell.json          status, configuration with sources, versions, host, timings
-                                     /curve.csv          one row per evaluation
-                                     /metrics.csv        the method's metrics, averaged between evaluations
-                                     /evaluation.csv     final design, return and success on each evaluation instance
-                                     /policy.safetensors final networks
-                                     /checkpoint.safetensors, progress.json, cell.lock, output.log   while it runs
+::
+
+  OUT/codesign-bench.json                                  marks a results folder
+  OUT/archive.json                                         marks an unpacked archive, which is only read
+  OUT/<task>/<method>/<variant>/seed-00/cell.json          status, configuration with sources, versions, host, timings
+                                       /curve.csv          one row per evaluation
+                                       /metrics.csv        the method's metrics, averaged between evaluations
+                                       /evaluation.csv     final design, return, success on each evaluation instance
+                                       /policy.safetensors final networks
+                                       /checkpoint.safetensors, progress.json, cell.lock, output.log   while it runs
 """
 
 from __future__ import annotations

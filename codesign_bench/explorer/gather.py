@@ -68,7 +68,9 @@ def chosen_cells(results: Path, choice: Choice, log: Log) -> dict[str, list[Stor
     """
     done = [cell for cell in reported_cells(results) if cell.is_done and choice.includes(cell)]
     if not done:
-        raise UserError(f"no finished cell of this choice in '{results}'; see: codesign-bench status --results {results}")
+        raise UserError(
+            f"no finished cell of this choice in '{results}'; see: codesign-bench status --results {results}"
+        )
     without = [cell for cell in done if not cell.has_policy]
     if without:
         log(f"left out: {_counted(len(without))} without a policy in '{results}'")

@@ -97,7 +97,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         _leave_deleted_folder(options)
         import_modules(options.imports)
         raise_on_interrupt()  # from here on there may be something to save
-        with json_lines() if getattr(options, "json", False) else nullcontext(Console()) as console:
+        with json_lines() if getattr(options, "json", False) else nullcontext(_plain_or_terminal()) as console:
             return int(options.command(options, console))
     except UserError as error:
         print(f"{PROGRAM}: {in_few_lines(str(error))}", file=sys.stderr)
@@ -147,3 +147,11 @@ def build_parser() -> argparse.ArgumentParser:
         )
         module.add_arguments(command)
     return parser
+
+
+def _plain_or_terminal() -> Console:
+    """Return a console that draws on a terminal alone.
+
+    FORCE_COLOR, which notebooks set, would make rich draw its moving table into a pipe or a file, too.
+    """
+    return Console() if sys.stdout.isatty() else Console(force_terminal=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -27,6 +28,14 @@ def test_run_status_and_plot(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     picture = capsys.readouterr().out.splitlines()[-1]
     assert picture == str(figures / "learning_curves.png")
     assert {path.name for path in figures.iterdir()} == {f"learning_curves.{kind}" for kind in ("png", "pdf", "csv")}
+
+
+def test_a_pipe_gets_plain_lines_although_a_notebook_wants_colours(tmp_path: Path) -> None:
+    line = [sys.executable, "-m", "codesign_bench", *RUN, "--import", "toy", "--seeds", "1", "--out", str(tmp_path)]
+    wanting = {**os.environ, "FORCE_COLOR": "1", "PYTHONPATH": str(Path(__file__).resolve().parents[1])}
+    done = subprocess.run(line, capture_output=True, text=True, env=wanting, check=True)
+    assert done.stdout.splitlines()[-1] == "all 1 cells done"
+    assert "\x1b" not in done.stdout
 
 
 @pytest.mark.parametrize(

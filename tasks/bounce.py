@@ -1,10 +1,11 @@
-"""Bounce: a strip, bent to a shape of its own, sends three falling balls through a hoop. Docstring of `Bounce` has more.
+"""Bounce: a bent strip sends three falling balls through a hoop. Docstring of `Bounce` has the details.
 
 Shapes: `b` slots a call names, `I` = 9 instance, `D` = 5 design, `C` = 1 control, `K` = 3 balls, `P` = 8 points.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -33,7 +34,6 @@ from ._strip import (
     STRIP_HALF_WIDTH,
     STRIP_SCENE,
     strip_graph,
-    strip_lengths,
     strip_parts,
     strip_tool,
 )
@@ -363,7 +363,7 @@ class _BounceSimulator(PlanarSimulator):
         x, y = self.hoop[slot].tolist()
         rim, foot = HOOP_HALF_WIDTH, 0.6 * HOOP_HALF_WIDTH
         corners = [(x - rim, y), (x - foot, y - rim), (x + foot, y - rim), (x + rim, y)]
-        for start, end in zip(corners, corners[1:], strict=False):
+        for start, end in pairwise(corners):
             canvas.segment(start, end, 0.03, COLOURS["goal"])
         for side in (corners[0], corners[-1]):
             canvas.circle(side, 0.1, COLOURS["goal"])

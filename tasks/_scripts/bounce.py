@@ -23,7 +23,6 @@ from ..bounce import (
     RAIL,
     RESTITUTION,
     SHAPE,
-    SIDES,
     Bounce,
     bent_strip,
 )
@@ -109,7 +108,6 @@ def miss(strips: Floats, balls: Floats, hoops: Floats) -> Floats:
         balls: positions relative to the hand and velocities of falling balls (n, K, 4) or (K, 4), m and m/s.
         hoops: centres (n, 2) or (2,) relative to the hand, m.
     """
-    balls, hoops = np.broadcast_to(balls, (len(strips), *balls.shape[-2:])) if balls.ndim == 2 else balls, hoops
     start, link = strips[:, None, :-1], np.diff(strips, axis=1)[:, None]  # (n, 1, segments, 2)
     length = np.linalg.norm(link, axis=-1)
     along = link / length[..., None]

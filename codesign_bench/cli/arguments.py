@@ -285,8 +285,15 @@ def chosen_names(group: str, given: Sequence[str], meanings: Mapping[str, Sequen
     return chosen
 
 
+def groups(group: str) -> dict[str, tuple[str, ...]]:
+    """Return what `all` and `beyond` stand for in `group`, "methods" or "tasks"."""
+    study = load_study(DEFAULT_STUDY)
+    of_study = {"methods": study.methods, "tasks": study.tasks}[group]
+    return {ALL: of_study, BEYOND: tuple(name for name in names(group) if name not in of_study)}
+
+
 def chosen_tasks(given: Sequence[str], log: Log = silent, sound: bool = True) -> list[str]:
-    """Return the tasks that `--task` selects.
+    """Return the tasks that `--task` selects: `all` is those of the default study, `beyond` all others.
 
     What cannot be used in this Python is no part of `all`, and `log` names it; by its own name, it is refused.
 
@@ -301,7 +308,7 @@ def chosen_tasks(given: Sequence[str], log: Log = silent, sound: bool = True) ->
     """
     from codesign_bench.task import load_task
 
-    chosen = chosen_names("tasks", given, {ALL: names("tasks")})
+    chosen = chosen_names("tasks", given, groups("tasks"))
     return _without_unusable(chosen, _words(given), load_task if sound else _if_available(load_task), log)
 
 
@@ -313,9 +320,7 @@ def chosen_methods(given: Sequence[str], log: Log = silent, sound: bool = True) 
     """
     from codesign_bench.method import load_method
 
-    paper = load_study(DEFAULT_STUDY).methods
-    beyond = tuple(name for name in names("methods") if name not in paper)
-    chosen = chosen_names("methods", given, {ALL: paper, BEYOND: beyond})
+    chosen = chosen_names("methods", given, groups("methods"))
     return _without_unusable(chosen, _words(given), load_method if sound else _if_available(load_method), log)
 
 

@@ -26,7 +26,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     tasks = kinds.add_parser(
         "tasks", help="environment steps, compared with the bare physics engine", allow_abbrev=False
     )
-    tasks.add_argument("--task", nargs="+", default=[ALL], metavar="T", help="names, or all (default)")
+    tasks.add_argument(
+        "--task",
+        nargs="+",
+        default=[ALL],
+        metavar="T",
+        help="names, all (default; the paper's six), or beyond (all others)",
+    )
     tasks.add_argument("--seconds", type=OfKind(Seconds), default=5.0, metavar="S", help="seconds per task; default: 5")
     tasks.add_argument(
         "--cores",
@@ -61,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_sweep(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--task", required=True, nargs="+", metavar="T", help="names, or all")
+    parser.add_argument("--task", required=True, nargs="+", metavar="T", help="names, all, or beyond")
     parser.add_argument("--method", required=True, nargs="+", metavar="M", help="names, all, or beyond")
     parser.add_argument("--profile", nargs="+", metavar="P", help="names; default: laptop and the paper's")
     parser.add_argument("--device", choices=get_args(Device), help="device for network updates; default: cpu")

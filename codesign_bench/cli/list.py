@@ -6,12 +6,13 @@ import argparse
 
 from rich.console import Console
 
+from codesign_bench.cli.arguments import ALL, groups
 from codesign_bench.config.profiles import profiles
 from codesign_bench.console import printer
 from codesign_bench.errors import UnavailableError
 from codesign_bench.registry import built_in, names
 from codesign_bench.source_code import SourceModule
-from codesign_bench.study import DEFAULT_STUDY, load_study, study_names
+from codesign_bench.study import load_study, study_names
 
 TOOLS = {True: "a tool per goal", False: "one tool for all goals", None: ""}
 """`Method.tool_per_goal` -> its words; None: not known without an import."""
@@ -25,20 +26,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     """Print the names."""
     del options
-    log, of_study = printer(console), load_study(DEFAULT_STUDY).methods
-    beyond = [name for name in names("methods") if name not in of_study]
-    width = max(map(len, names("methods")))
-    for title, members in (("methods", of_study), ("methods beyond", beyond)):
+    log, width = printer(console), max(map(len, names("methods")))
+    for word, members in groups("methods").items():
         if members:
-            log(title)
+            log(_heading("methods", word))
         tools = {name: _tools(name) for name in members}
         for words in TOOLS.values():
             for name in [name for name in members if tools[name] == words]:
                 log(f"  {name:{width}} {words}".rstrip())
-    for title, group in (("tasks", "tasks"), ("figures", "paper_figs")):
-        log(title)
-        for name in names(group):
-            log(f"  {name}")
+    of_tasks = [(_heading("tasks", word), members) for word, members in groups("tasks").items()]
+    for title, listed in [*of_tasks, ("figures", names("paper_figs"))]:
+        for line in [title, *(f"  {name}" for name in listed)] if listed else []:
+            log(line)
     for title, entries in (
         ("studies", [(name, _title(name)) for name in study_names()]),
         ("profiles", [(profile.name, profile.help) for profile in profiles().values()]),
@@ -47,6 +46,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
         for name, text in entries:
             log(f"  {name:8} {text}")
     return 0
+
+
+def _heading(kind: str, word: str) -> str:
+    """Return the title above the members of a group, named as on the command line; `all` needs no word."""
+    return kind if word == ALL else f"{kind} {word}"
 
 
 def _tools(method: str) -> str:

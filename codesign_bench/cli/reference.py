@@ -25,7 +25,13 @@ HELP = "measure reference points: idling, random tools, the script, the best sin
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the tasks, the results folder and what is measured again."""
-    parser.add_argument("--task", nargs="+", default=[ALL], metavar="T", help="names, or all (default)")
+    parser.add_argument(
+        "--task",
+        nargs="+",
+        default=[ALL],
+        metavar="T",
+        help="names, all (default; the paper's six), or beyond (all others)",
+    )
     add_results(parser, own_results)
     add_json(parser)
     add_dry_run(parser, "say how many episodes would be played on each task, and how long that takes")

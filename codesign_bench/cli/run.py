@@ -46,7 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--method", required=True, nargs="+", metavar="M", help="names, all (the paper's five), or beyond (all others)"
     )
-    parser.add_argument("--task", required=True, nargs="+", metavar="T", help="names, or all")
+    parser.add_argument(
+        "--task", required=True, nargs="+", metavar="T", help="names, all (the paper's six), or beyond (all others)"
+    )
     parser.add_argument(
         "--seeds",
         default="1",

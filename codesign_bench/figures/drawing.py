@@ -22,7 +22,7 @@ from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError, in_one_line
 from codesign_bench.figures.comparison import made_otherwise, with_compared
 from codesign_bench.figures.source import Request, Source, curves
-from codesign_bench.registry import built_in, load_all, load_module, usable_modules
+from codesign_bench.registry import built_in, load_all, load_module, names, usable_modules
 from codesign_bench.storage.files import Outputs, make_folder, removed_if_refused
 from codesign_bench.storage.frames import stored_curves
 from codesign_bench.storage.tables import csv_bytes
@@ -64,12 +64,14 @@ def draw_figures(
         out: folder of the figures.
         log: prints every path, what is left out, and differences in how compared cells were made.
         compare: other results, whose curves are overlaid in figures with `COMPARES`.
-        study: without names, its figures are drawn and those that belong to no study; None: the default study.
+        study: without names, its figures are drawn and those that belong to no study; with names, they show its tasks,
+            too, although there are no cells of theirs; None: the default study.
 
     Raises:
         UserError: an unknown figure, a folder that is not writable, or no figure can be drawn.
     """
-    request = Request(results, log, named=bool(wanted))
+    chosen = load_study(DEFAULT_STUDY) if study is None else study
+    request = Request(results, log, named=bool(wanted), tasks=chosen.tasks or names("tasks"))
     modules = _modules(wanted or figure_names(study, log), request)
     if compare is not None and not any(getattr(module, "COMPARES", False) for module in modules.values()):
         known = _modules(usable_modules("paper_figs"), Request(results, silent))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
+from codesign_bench.registry import in_order
 from codesign_bench.storage.archive import is_archive
 from codesign_bench.storage.cells import reported_cells
 from codesign_bench.storage.frames import load_evaluations, stored_curves
@@ -31,6 +32,8 @@ class Request:
     """Prints a line, e.g. on what is left out."""
     named: bool = False
     """Whether the user named the figure."""
+    tasks: tuple[str, ...] = ()
+    """Tasks that a named figure shows although there are no cells of theirs: those of the study."""
 
     @property
     def may_measure(self) -> bool:
@@ -63,10 +66,9 @@ def evaluations(request: Request) -> pd.DataFrame:
 def design_sensitivity(request: Request) -> pd.DataFrame:
     """Return the outcome of many tools on many goals; if the figure was named, missing tasks are measured."""
     from codesign_bench.evaluation.sensitivity import load_sensitivity, measure_missing
-    from codesign_bench.task import task_names
 
     if request.may_measure:
-        measure_missing(request.results, task_names(), request.log)
+        measure_missing(request.results, tasks_shown(request), request.log)
     return load_sensitivity(request.results)
 
 
@@ -97,6 +99,18 @@ def trials_on_an_arm(request: Request) -> pd.DataFrame:
 
     trials = load_deployment(request.results)
     return trials[trials[SEED] == trials.groupby("task")[SEED].transform("min")]
+
+
+def tasks_shown(request: Request) -> list[str]:
+    """Return the tasks that a figure of tasks shows: those with cells and, if it was named, those of the study.
+
+    Raises:
+        UserError: there are no cells, and it was not named.
+    """
+    if not request.named:
+        return tasks_in(request.results)
+    cells = reported_cells(request.results) if request.results.is_dir() else ()
+    return in_order("tasks", {*request.tasks, *(cell.record.task for cell in cells)})
 
 
 def tasks_in(results: Path) -> list[str]:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.evaluation.rendering import render_slot
-from codesign_bench.figures.source import Request, tasks_in
-from codesign_bench.task import Task, load_task, task_names
+from codesign_bench.figures.source import Request, tasks_shown
+from codesign_bench.task import Task, load_task
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.play import play
 
@@ -22,7 +22,7 @@ MOMENT = 0.6
 
 
 def tasks_at_work(request: Request) -> pd.DataFrame:
-    """Return one picture of each task in the results; of every task if the figure was named.
+    """Return one picture of each task in the results; also of every task of the study if the figure was named.
 
     Returns:
         Columns task, title, instance (its number), step (of the picture), steps (of the whole episode), return and
@@ -34,7 +34,7 @@ def tasks_at_work(request: Request) -> pd.DataFrame:
     import pandas as pd
 
     rows = []
-    for name in task_names() if request.named else tasks_in(request.results):
+    for name in tasks_shown(request):
         try:
             rows.append(_at_work(load_task(name)))
         except UserError as error:

@@ -82,6 +82,7 @@ STUDY = Study(
     title="What is a separate credit for the design worth?",
     question="Does a separate, undiscounted advantage for the design help, and does that depend on the architecture?",
     methods=METHODS,
+    tasks=TASKS,
     experiments={
         "credit": Experiment(
             ("design_credit",),

@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # claims need pandas and scipy; listing studies does not
     from codesign_bench.claims.claim import Claim
 
 DEFAULT_STUDY = "corl2023"
-"""The default of `--study`; `--method all` selects its methods."""
+"""The default of `--study`; `--method all` and `--task all` select its methods and tasks."""
 ALL = "all"
 
 
@@ -42,6 +42,8 @@ class Study:
     """A publication, or "ours"."""
     methods: tuple[str, ...] = ()
     """The methods compared, in the order of its tables."""
+    tasks: tuple[str, ...] = ()
+    """The tasks that it asks about, in the order of its figures; none: any task."""
     experiments: Mapping[str, Experiment] = field(default_factory=dict)
     """By name, cheap ones first."""
     claims: Callable[[], Sequence[Claim]] = no_claims

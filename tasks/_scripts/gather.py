@@ -20,7 +20,7 @@ class GatherScript(Behaviour):
     GAIN = 4.0
     """Speed of the hand per distance, 1/s."""
     NEAR = 2.0
-    """From this distance before the circle on, the hand corrects the middle of the grains, not the pocket's place, m."""
+    """So far before the circle, the hand turns from the place of the pocket to the middle of the grains, m."""
 
     def __init__(self, task: Gather) -> None:
         self.task = task

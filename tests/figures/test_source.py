@@ -18,6 +18,7 @@ from codesign_bench.figures.source import (
     evaluations,
     headroom,
     tasks_in,
+    tasks_shown,
     timing,
     trials_on_an_arm,
 )
@@ -74,6 +75,14 @@ def test_what_was_measured_is_read_and_nothing_is_measured_for_a_figure_that_nob
     assert (told, list(tmp_path.iterdir())) == ([], [])
     store_table(tmp_path / "design_sensitivity" / "push.csv", DESIGN_SENSITIVITY, {"task": "push", "return": 2.0})
     assert design_sensitivity(Request(tmp_path))["return"].tolist() == [2.0]
+
+
+def test_a_named_figure_of_tasks_shows_those_of_the_study_and_those_with_cells(tmp_path: Path) -> None:
+    named = Request(tmp_path / "runs", named=True, tasks=("scoop", "push"))
+    assert tasks_shown(named) == ["push", "scoop"], "there need be no folder"
+    store_cell(tmp_path / "runs", task="bounce")
+    assert tasks_shown(named) == ["push", "scoop", "bounce"]
+    assert tasks_shown(Request(tmp_path / "runs", tasks=("scoop", "push"))) == ["bounce"]
 
 
 @pytest.mark.parametrize(

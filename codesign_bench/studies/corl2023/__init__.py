@@ -33,6 +33,7 @@ STUDY = Study(
     question="Does a designer that sees the goal, trained together with a controller, beat one tool for all goals?",
     source="Liu, Tian, Guo, Liu, Wu; CoRL 2023",
     methods=METHODS,
+    tasks=TASKS,
     experiments=EXPERIMENTS,
     claims=claims,
     profiles=(PAPER,),

@@ -87,7 +87,7 @@ FLOOR: Annotated[float, Given("m", OURS)] = -4.0
 """Height of the floor, on which balls come to rest."""
 LOST_HEIGHT: Annotated[float, Given("m", OURS)] = -2.5
 """A ball below this, which is below every hoop and strip, has missed."""
-WALLS: Annotated[tuple[float, float], Given("m", OURS)] = (-10.0, 10.0)
+WALLS: Annotated[tuple[float, float], Given("m", OURS)] = (-7.0, 7.0)
 """Walls on the left and right, behind every hoop."""
 
 HORIZON: Annotated[int, Given("control steps", OURS)] = 100

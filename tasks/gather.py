@@ -185,9 +185,8 @@ class Gather(Task):
     outcome = Quantity("grains in the circle", "grains")
     soundness = Soundness(
         overlap=STRIP_HALF_WIDTH,
-        speed=2.0 * float(np.hypot(*MAX_SPEED)),
+        speed=1.5 * float(np.hypot(*MAX_SPEED)),
         outcome_change=0.5,
-        chaotic=True,
     )
 
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:

@@ -17,6 +17,8 @@ class GatherScript(Behaviour):
 
     CURVATURE = 0.9
     """Normalised rise of a segment per distance from the bowl's deepest place, 1/m."""
+    BEYOND = 0.25
+    """How far behind the circle, as seen from the middle, the bowl is deepest: the heap leans on the longer wall, m."""
     GAIN = 4.0
     """Speed of the hand per distance, 1/s."""
     NEAR = 2.0
@@ -26,10 +28,11 @@ class GatherScript(Behaviour):
         self.task = task
 
     def design(self, observation: Singles) -> Singles:
-        """Return a bowl around the circle's x: the farther a segment is from there, the steeper, up to the steepest."""
+        """Return a bowl around a place near the circle's x: the farther a segment is from there, the steeper."""
         goal_x = self.task.layout.split(observation).goal[..., GOAL.start, None].astype(np.float64)
+        deepest = goal_x + self.BEYOND * np.sign(goal_x)
         middles = 0.5 * (KNOTS_X[1:] + KNOTS_X[:-1])
-        blades: Singles = np.clip(self.CURVATURE * (middles - goal_x), -1.0, 1.0).astype(np.float32)
+        blades: Singles = np.clip(self.CURVATURE * (middles - deepest), -1.0, 1.0).astype(np.float32)
         return blades
 
     def act(self, observation: Singles) -> Singles:

@@ -127,6 +127,7 @@ BALL = Box.of(
     velocity_x=(-15.0, 15.0, "m/s"),
     velocity_y=(-15.0, 15.0, "m/s"),
     through=(0.0, 1.0, "1"),
+    nearest=(0.0, 15.0, "m"),
 )
 """Observation of one ball."""
 STATE = Box.of(
@@ -157,8 +158,9 @@ class Bounce(Task):
         velocity of the hand along x (m/s).
 
     Observation
-        State, 16: position x of the hand (m); for each ball, displacement from the hand x, y (m), velocity x, y (m/s),
-        and whether it has gone through the hoop. Goal, 2: centre x, y of the hoop (m). Then the design and the phase.
+        State, 19: position x of the hand (m); for each ball, displacement from the hand x, y (m), velocity x, y (m/s),
+        whether it has gone through the hoop, and its smallest distance so far from the hoop's centre (m). Goal, 2:
+        centre x, y of the hoop (m). Then the design and the phase.
 
     Design space
         A strip of seven straight segments of equal length on either side. The heading at u, the place along the strip
@@ -373,7 +375,7 @@ class _BounceSimulator(PlanarSimulator):
         self.state[slots, HAND] = bodies[:, TOOL_BODY, 0]
         balls = bodies[:, BALL_BODIES].copy()
         balls[..., PLACE] -= bodies[:, None, TOOL_BODY, PLACE]
-        seen = np.concatenate([balls, self.through[slots][:, :, None]], axis=2)  # as in BALL
+        seen = np.concatenate([balls, self.through[slots][..., None], self.distance[slots][..., None]], axis=2)  # as in BALL
         self.state[slots, BALLS] = seen.reshape(len(slots), -1)
 
 

@@ -108,13 +108,20 @@ INSTANCE = Box.of(
 )
 GOAL, SCATTERS = INSTANCE.slice("goal_x", "goal_y"), INSTANCE.group("grain_")
 
+GRAIN = Box.of(
+    x=(-8.0, 8.0, "m"),
+    y=(-6.0, 14.0, "m"),
+    velocity_x=(-4.0, 4.0, "m/s"),
+    velocity_y=(-4.0, 4.0, "m/s"),
+)
+"""Observation of one grain."""
 STATE = Box.of(
     hand_x=(-SIDEWAYS, SIDEWAYS, "m"),
     hand_y=(LOWEST_START, FARTHEST, "m"),
     **{
-        f"grain_{k + 1}_{axis}": (*bounds, "m")
+        f"grain_{k + 1}_{name}": (low, high, unit)
         for k in range(NUM_GRAINS)
-        for axis, bounds in (("x", (-8.0, 8.0)), ("y", (-6.0, 14.0)))
+        for name, low, high, unit in zip(GRAIN.names, GRAIN.low, GRAIN.high, GRAIN.units, strict=True)
     },
 )
 HAND, GRAINS = STATE.slice("hand_x", "hand_y"), STATE.group("grain_")
@@ -135,8 +142,8 @@ class Gather(Task):
         Design, 7: rise of each segment of the blade (m). Control, 2: velocity of the hand along x and y (m/s).
 
     Observation
-        State, 14: position x, y of the hand and of each grain (m); grains are in the order in which they lay at the
-        start. Goal, 2: centre x, y of the circle (m). Then the design and the phase.
+        State, 26: position x, y of the hand (m); position x, y (m) and velocity x, y (m/s) of each grain, in the order
+        in which they lay at the start. Goal, 2: centre x, y of the circle (m). Then the design and the phase.
 
     Design space
         A blade of seven straight segments of equal width. The rise of a segment is the difference in y between its
@@ -273,7 +280,7 @@ class _GatherSimulator(PlanarSimulator):
         space.damping = float(np.exp(-DRAG))  # the share of its velocity that a body keeps for a second
         own_friction = GRAIN_FRICTION**0.5  # pymunk multiplies the two friction coefficients of a contact
         for x, y, _, _ in self.bodies[slot, GRAIN_BODIES].tolist():
-            grain = pymunk.Body(1.0, pymunk.moment_for_circle(1.0, 0.0, GRAIN_RADIUS))
+            grain = pymunk.Body(1.0, float("inf"))  # it slides and does not spin: a spin could not be observed
             grain.position = (x, y)
             disc = pymunk.Circle(grain, GRAIN_RADIUS)
             disc.friction = own_friction
@@ -325,7 +332,7 @@ class _GatherSimulator(PlanarSimulator):
     def _write_state(self, slots: Slots) -> None:
         bodies = self.bodies[slots]
         self.state[slots, HAND] = bodies[:, TOOL_BODY, PLACE]
-        self.state[slots, GRAINS] = bodies[:, GRAIN_BODIES, PLACE].reshape(len(slots), -1)
+        self.state[slots, GRAINS] = bodies[:, GRAIN_BODIES].reshape(len(slots), -1)  # as in GRAIN
 
 
 def blade(designs: Floats) -> Floats:

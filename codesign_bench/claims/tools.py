@@ -14,7 +14,7 @@ from codesign_bench import stats
 from codesign_bench.claims.claim import Rule
 from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, Finding, InsufficientData, above, reason
-from codesign_bench.claims.statistics import T_INTERVAL, run_command, seeds_of
+from codesign_bench.claims.statistics import T_INTERVAL, seeds_of
 from codesign_bench.evaluation.sensitivity import measure_missing
 
 GOAL_SHARE = 0.1
@@ -25,8 +25,8 @@ FEWEST_TOOLS = 50
 """Fewest tried tools for a statement about tools in general (ours)."""
 
 
-def tools_vary(task: str, method: str, seeds: int) -> Rule:
-    """Return the rule for "`method` designs different tools for different goals of `task`"."""
+def tools_vary(task: str, method: str, needs: tuple[str, ...]) -> Rule:
+    """Return the rule for "`method` designs different tools for different goals of `task`"; see `Rule.needs`."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         del rng  # nothing is drawn
@@ -44,7 +44,7 @@ def tools_vary(task: str, method: str, seeds: int) -> Rule:
         statistic="variance of designs over goals, as a share of their variance over goals and seeds",
         words=f"supported if {T_INTERVAL}, cut off at 0 and 1, is above {GOAL_SHARE:g}, contradicted if below "
         f"{GOAL_SHARE:g}; a spread over goals below {FLOOR:.0%} of the ranges counts as none",
-        needs=(run_command("all", task, seeds),),
+        needs=needs,
         judge=judge,
     )
 
@@ -69,8 +69,8 @@ def goal_shares(rows: pd.DataFrame, widths: Mapping[str, float]) -> np.ndarray:
     return within / total if total > 0.0 else np.zeros_like(within)
 
 
-def no_single_tool(task: str) -> Rule:
-    """Return the rule for "no single tool solves every goal of `task`"."""
+def no_single_tool(task: str, needs: tuple[str, ...]) -> Rule:
+    """Return the rule for "no single tool solves every goal of `task`"; see `Rule.needs`."""
 
     def judge(evidence: Evidence, rng: np.random.Generator) -> Finding:
         del rng  # one goal that a tool fails is enough: nothing is estimated from a sample
@@ -93,7 +93,7 @@ def no_single_tool(task: str) -> Rule:
         kind="no single tool",
         statistic="largest share that one tool solves of the goals that some tool solves",
         words=f"supported if it is below 1, contradicted if it is 1, over at least {FEWEST_TOOLS} tools; no interval",
-        needs=("codesign-bench plot design_sensitivity --results {results}",),
+        needs=needs,
         judge=judge,
         measure=lambda results, log: measure_missing(results, [task], log),
     )

@@ -119,6 +119,7 @@ STUDY = Study(
     title="What is needed: a tool per goal, reinforcement learning, co-design?",
     question="Which part of learning to design and use tools earns its cost, and which would a simpler method replace?",
     methods=METHODS,
+    tasks=TASKS,
     experiments={
         "necessity": Experiment(("learning_curves", "final_results"), "ours", ((Grid(TASKS, METHODS, SEEDS),),)),
     },

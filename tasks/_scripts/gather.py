@@ -9,7 +9,7 @@ import numpy as np
 
 from codesign_bench.task import Behaviour, Floats, Singles
 
-from ..gather import GOAL, GRAINS, HAND, KNOTS_X, MAX_SPEED, NUM_GRAINS, SIDEWAYS, Gather, blade
+from ..gather import GOAL, GRAIN, GRAINS, HAND, KNOTS_X, MAX_SPEED, NUM_GRAINS, SIDEWAYS, Gather, blade
 
 
 class GatherScript(Behaviour):
@@ -39,7 +39,7 @@ class GatherScript(Behaviour):
         """Return the hand's velocity, normalised."""
         seen = self.task.layout.split(np.atleast_2d(observation).astype(np.float64))
         goal, hand = seen.goal[:, GOAL], seen.state[:, HAND]
-        middle = seen.state[:, GRAINS].reshape(-1, NUM_GRAINS, 2).mean(axis=1)
+        middle = seen.state[:, GRAINS].reshape(-1, NUM_GRAINS, GRAIN.size)[..., :2].mean(axis=1)
         near = goal[:, 1] - middle[:, 1] < self.NEAR
         aim = np.where(near, hand[:, 0] + goal[:, 0] - middle[:, 0], self._place(seen.design, goal[:, 0]))
         aim = np.clip(aim, -SIDEWAYS, SIDEWAYS)

@@ -14,7 +14,7 @@ from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import CONTRADICTED, SUPPORTED, UNDECIDED, InsufficientData
 from evidence import OURS, TASK, cells, found
 
-VARY = tools.tools_vary(TASK, OURS, 6)
+VARY = tools.tools_vary(TASK, OURS, ())
 WIDTHS: Mapping[str, Mapping[str, float]] = {TASK: {"design_length": 2.0, "design_angle": 4.0, "design_fixed": 0.0}}
 
 
@@ -83,7 +83,7 @@ def test_a_task_that_is_not_known_is_lacking() -> None:
         found(VARY, Evidence(evaluations=designs([(0.0,)] * 3).evaluations))
 
 
-NO_SINGLE = tools.no_single_tool(TASK)
+NO_SINGLE = tools.no_single_tool(TASK, ())
 
 
 def tried(solves: Sequence[Sequence[int]], copies: int = 25) -> Evidence:

@@ -36,6 +36,7 @@ def _listed(option: str, values: tuple[float, ...]) -> str:
 
 
 ALL_METHODS = {task: run_command("all", task, SEEDS[task]) for task in TASKS}
+SENSITIVITY = "codesign-bench plot design_sensitivity --results {results}"
 CUTOUTS = run_command(OURS, FETCH, FEW_SEEDS, _listed("cutout", FRACTIONS))
 TRADEOFFS = run_command(OURS, CATCH, FEW_SEEDS, _listed("alpha", ALPHAS))
 FINE_TUNED = (
@@ -99,7 +100,7 @@ CLAIMS: tuple[Claim, ...] = (
             f"tools_vary.{task}",
             f"on {task}, one learned designer makes different tools for different goals",
             TOOLS,
-            tools.tools_vary(task, OURS, SEEDS[task]),
+            tools.tools_vary(task, OURS, (ALL_METHODS[task],)),
             (task,),
         )
         for task in TASKS
@@ -109,7 +110,7 @@ CLAIMS: tuple[Claim, ...] = (
             f"no_single_tool.{task}",
             f"no single tool solves all instances of {task}",
             ENVIRONMENTS,
-            tools.no_single_tool(task),
+            tools.no_single_tool(task, (SENSITIVITY,)),
             (task,),
             check_of_scene=True,
         )

@@ -69,11 +69,11 @@ SCATTER: Annotated[float, Given("m", OURS)] = 0.1
 DROP_HEIGHT: Annotated[tuple[float, float], Given("m", OURS)] = (4.2, 4.8)
 """Lowest and highest start of a ball above the hand."""
 
-HOOP_DISTANCE: Annotated[tuple[float, float], Given("m", OURS)] = (2.6, 4.2)
+HOOP_DISTANCE: Annotated[tuple[float, float], Given("m", OURS)] = (2.8, 4.2)
 """Smallest and largest distance of the hoop's centre from the hand's start, along x: no strip reaches it."""
 HOOP_HEIGHT: Annotated[tuple[float, float], Given("m", OURS)] = (-1.0, 0.5)
 """Lowest and highest hoop, relative to the hand."""
-HOOP_HALF_WIDTH: Annotated[float, Given("m", OURS)] = 0.5
+HOOP_HALF_WIDTH: Annotated[float, Given("m", OURS)] = 0.6
 """Half the width of the hoop."""
 
 THROUGH_REWARD: Annotated[float, Given("1", OURS)] = 1.0
@@ -90,9 +90,9 @@ LOST_HEIGHT: Annotated[float, Given("m", OURS)] = -2.5
 WALLS: Annotated[tuple[float, float], Given("m", OURS)] = (-7.0, 7.0)
 """Walls on the left and right, behind every hoop."""
 
-HORIZON: Annotated[int, Given("control steps", OURS)] = 100
+HORIZON: Annotated[int, Given("control steps", OURS)] = 50
 """Time limit."""
-STEPS_PER_CONTROL: Annotated[int, Given("physics steps", OURS)] = 8
+STEPS_PER_CONTROL: Annotated[int, Given("physics steps", OURS)] = 16
 """In a control step."""
 PHYSICS_PERIOD: Annotated[float, Given("s", OURS)] = 1.0 / 240.0
 """Of a physics step: a ball that hits a strip moves a fifth of its radius."""
@@ -375,7 +375,8 @@ class _BounceSimulator(PlanarSimulator):
         self.state[slots, HAND] = bodies[:, TOOL_BODY, 0]
         balls = bodies[:, BALL_BODIES].copy()
         balls[..., PLACE] -= bodies[:, None, TOOL_BODY, PLACE]
-        seen = np.concatenate([balls, self.through[slots][..., None], self.distance[slots][..., None]], axis=2)  # as in BALL
+        so_far = np.stack([self.through[slots], self.distance[slots]], axis=2)
+        seen = np.concatenate([balls, so_far], axis=2)  # as in BALL
         self.state[slots, BALLS] = seen.reshape(len(slots), -1)
 
 

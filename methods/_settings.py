@@ -21,6 +21,7 @@ PPO: Tuned = {
 
 PPO_BY_TASK: Mapping[str, Mapping[str, Any]] = {
     "bounce": {"gamma": 0.99, "design_log_std": -1.5},
+    "gather": {"gamma": 0.99},
     "catch_balls": {"design_log_std": -0.3},
     "lift_cup": {
         "batch_size": 20_000,

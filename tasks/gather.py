@@ -80,9 +80,9 @@ SLACK_REWARD: Annotated[float, Given("1", OURS)] = -0.001
 SUCCESS_REWARD: Annotated[float, Given("1", OURS)] = 1.0
 """Added once, when all grains rest in the circle."""
 
-HORIZON: Annotated[int, Given("control steps", OURS)] = 150
+HORIZON: Annotated[int, Given("control steps", OURS)] = 75
 """Time limit: enough for one sweep and a little more."""
-STEPS_PER_CONTROL: Annotated[int, Given("physics steps", OURS)] = 4
+STEPS_PER_CONTROL: Annotated[int, Given("physics steps", OURS)] = 8
 """In a control step."""
 PHYSICS_PERIOD: Annotated[float, Given("s", OURS)] = 1.0 / 120.0
 """Of a physics step: the blade moves a tenth of a grain's radius."""

@@ -94,7 +94,7 @@ def test_a_free_grain_slides_on_as_far_as_the_drag_says() -> None:
     episodes, simulator = begin()
     places = np.stack([np.arange(gather.NUM_GRAINS), np.full(gather.NUM_GRAINS, 3.0)], axis=1)
     put(simulator, places, velocity=(0.0, 2.0))
-    for _ in range(60):
+    for _ in range(30):
         episodes.control(SLOT, IDLE)
     # v' = -r v stops after v / r; steps of length h make it shorter by up to h v.
     np.testing.assert_allclose(
@@ -108,7 +108,7 @@ def test_a_slanted_blade_moves_grains_to_its_rear_end_and_a_level_one_straight_a
     for rise in (0.0, -side):  # a wall that falls back to the right sends grains to the right
         episodes, simulator = begin(design=np.full((1, gather.SEGMENTS), rise))
         before = grains_of(simulator)[:, 0]
-        for _ in range(80):
+        for _ in range(40):
             episodes.control(SLOT, FORWARDS)
         moved.append(grains_of(simulator)[:, 0] - before)
     straight, slanted = moved
@@ -140,7 +140,7 @@ def test_rewards_add_up_to_the_share_of_the_way_made() -> None:
     goal = (1.0, 5.0)
     episodes, simulator = begin(goal)
     first = np.linalg.norm(grains_of(simulator)[:, :2] - goal, axis=1).mean()
-    rewards = [episodes.control(SLOT, FORWARDS)[0][0] for _ in range(70)]
+    rewards = [episodes.control(SLOT, FORWARDS)[0][0] for _ in range(35)]
     last = np.linalg.norm(grains_of(simulator)[:, :2] - goal, axis=1).mean()
     assert last < first
     assert sum(rewards) == pytest.approx((first - last) / first + gather.SLACK_REWARD * len(rewards))

@@ -79,7 +79,7 @@ def test_a_trend_needs_two_levels_with_scores(rng: np.random.Generator) -> None:
     assert all(math.isnan(value) for value in jonckheere_p([[1.0], []], rng))
 
 
-@pytest.mark.parametrize("seeds", [3, 6])
+@pytest.mark.parametrize("seeds", [3, pytest.param(6, marks=pytest.mark.slow)])
 def test_without_an_effect_few_tests_find_one(seeds: int) -> None:
     rng, trials = np.random.default_rng(seeds), 400
     found = {"difference": 0, "trend": 0, "tasks": 0}

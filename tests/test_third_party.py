@@ -159,7 +159,7 @@ def test_a_module_named_on_the_command_line_learns_the_same(results: Path, tmp_p
     assert_same_results(cell(tmp_path, "random_search"), cell(results, "random_search"))
 
 
-@pytest.mark.parametrize(("method", "kills"), [("random_search", 1), ("sac", 2)])
+@pytest.mark.parametrize(("method", "kills"), [("random_search", 1), pytest.param("sac", 2, marks=pytest.mark.slow)])
 def test_a_killed_cell_resumes_to_the_bit(
     results: Path, installed: Path, tmp_path: Path, method: str, kills: int
 ) -> None:

@@ -24,6 +24,8 @@ QUANTITIES = {"return_mean": "mean return", "success_rate": "success rate"}
 PANELS_PER_ROW = 3
 PANEL_HEIGHT = 1.5
 """Height of a panel, in inches."""
+MOST_IN_A_COLUMN = 8
+"""Methods whose names fit below a single panel of a column's width; with more the figure is as wide as the page."""
 SLIVER = 0.05
 """Fraction of a curve's length below which a piece is too short to see."""
 REFERENCE_WIDTH = 0.7
@@ -88,7 +90,7 @@ def draw_curves(
     tasks = task_order(table["task"])
     columns = min(len(tasks), PANELS_PER_ROW)
     rows = len(QUANTITIES) * math.ceil(len(tasks) / columns)
-    narrow = columns == 1 and not _compares(table)
+    narrow = columns == 1 and not _compares(table) and table["method"].nunique() <= MOST_IN_A_COLUMN
     width = COLUMN_WIDTH if narrow else PAGE_WIDTH
     with style():
         height = rows * PANEL_HEIGHT + (0.9 if levels.empty else 1.2)

@@ -5,7 +5,7 @@ Colours are those of Okabe and Ito (2008), which readers with any common colour 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
@@ -41,6 +41,15 @@ COLUMN_WIDTH = 3.4
 PAGE_WIDTH = 7.0
 """Width of both columns, in inches."""
 BAND_OPACITY = 0.2
+SEED_DOTS: Mapping[str, Any] = {
+    "marker": "o",
+    "linestyle": "none",
+    "color": "black",
+    "markersize": 2.2,
+    "markeredgecolor": "white",
+    "markeredgewidth": 0.4,
+}
+"""How single seeds are drawn on a bar: the white edge keeps them visible on bars of every colour, black ones too."""
 
 SETTINGS = {
     "font.size": 7,

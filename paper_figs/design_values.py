@@ -92,7 +92,7 @@ def draw(frame: pd.DataFrame) -> Figure:
             _draw_panel(axes, own[own["seed"] == own["seed"].min()], entry)
         for axes in list(panels):
             axes.set_axis_off()
-        note = f"mean over seeds (n), {CONFIDENCE:.0%} t interval if {MIN_SEEDS} or more; dots: the lowest seed"
+        note = f"mean over seeds (n), {CONFIDENCE:.0%} t interval if {MIN_SEEDS} or more;\ndots: the lowest seed"
         handles, labels = figure.axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2, title=note, title_fontsize=5.5)
         figure.draw_without_rendering()

@@ -30,7 +30,7 @@ from codesign_bench.text_tables import latex, markdown
 
 from ._curves import PANELS_PER_ROW, QUANTITIES, evaluated_rows, method_labels
 from ._order import task_order
-from ._style import PAGE_WIDTH, in_order, line_styles, style
+from ._style import PAGE_WIDTH, SEED_DOTS, in_order, line_styles, style
 
 TITLE = "Final results"
 SOURCE = curves_with_references
@@ -229,7 +229,7 @@ def _draw_panel(axes: Axes, table: pd.DataFrame, seeds: Sequence[Sequence[float]
     for place, row in enumerate(table.to_dict("records")):
         colour, _ = styles[str(row["method"])]
         axes.plot([row["success_rate_low"], row["success_rate_high"]], [place, place], color=colour, linewidth=2.0)
-        axes.plot(seeds[place], [place] * len(seeds[place]), ".", color="black", markersize=2.0, alpha=0.6, zorder=3)
+        axes.plot(seeds[place], [place] * len(seeds[place]), zorder=3, **SEED_DOTS)
         axes.plot([row["success_rate"]], [place], "o", color=colour, markersize=4.0, gid=str(row["method"]))
     axes.set_yticks(range(len(table)), [f"{row['label']} ({row['seeds']})" for row in table.to_dict("records")])
     axes.set_ylim(len(table) - 0.5, -0.5)

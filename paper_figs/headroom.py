@@ -21,7 +21,7 @@ from codesign_bench.storage.frames import default_rows, require_columns
 from codesign_bench.storage.headroom import KNOWN, QUANTITIES, TOOLS
 
 from ._order import task_order
-from ._style import BLUE, GREEN, GREY, ORANGE, PAGE_WIDTH, in_order, style
+from ._style import BLUE, GREEN, GREY, ORANGE, PAGE_WIDTH, SEED_DOTS, in_order, style
 
 TITLE = "Headroom"
 SOURCE = source.headroom
@@ -141,7 +141,7 @@ def _draw_panel(axes: Axes, table: pd.DataFrame, rows: pd.DataFrame, quantity: s
             low, high = (float(own[tool][f"{quantity}_{end}"]) for end in ("low", "high"))
             axes.plot([low, high], [height, height], color=colour, linewidth=1.2)
             single = seeds[f"{tool}_{quantity}"].tolist()
-            axes.plot(single, [height] * len(single), ".", color="black", markersize=2.0, alpha=0.6, zorder=3)
+            axes.plot(single, [height] * len(single), zorder=3, **SEED_DOTS)
             axes.plot([own[tool][quantity]], [height], marker, color=colour, markersize=3.5, gid=f"{method} {tool}")
     known = float(table[f"{KNOWN}_{quantity}"].iloc[0])
     if not math.isnan(known):
@@ -162,5 +162,5 @@ def _add_legend(figure: Figure, *, has_known: bool) -> None:
     ]
     if has_known:
         handles.append(Line2D([], [], color="#444444", linestyle=":", linewidth=0.7, label="best known"))
-    note = f"mean over seeds (n); black dots: each seed; bars: {CONFIDENCE:.0%} t interval, if {MIN_SEEDS} or more"
+    note = f"mean over seeds (n); small dots: each seed; bars: {CONFIDENCE:.0%} t interval, if {MIN_SEEDS} or more"
     figure.legend(handles=handles, loc="outside lower center", ncols=3, title=note, title_fontsize=5.5)

@@ -3,7 +3,7 @@
 Every point is played on the task's evaluation instances, on which methods are judged, too. Nothing learns here; the
 best that is known also counts the finished cells of the results folder.
 
-Shapes: `N` evaluation instances, `I` instance, `K` tools, `D` design.
+Shapes: `N` evaluation instances, `I` instance, `K` tools, `F` finalists among them, `D` design.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codesign_bench.cell.variant import DEFAULT
 from codesign_bench.console import Log
@@ -261,15 +262,54 @@ def _played(task: Task, name: str, behaviour: Behaviour, source: str) -> Point:
     return Point(name, evaluation.returns, evaluation.successes.astype(np.float64), tools, source)
 
 
+def single_tool(task: Task, instances: Floats, jobs: int = 1) -> Floats:
+    """Return the normalised tool (D,) with the highest mean return on `instances` (N, I) with the script's controller.
+
+    Tools compete as for the point `best_single_tool`, but on any instances, e.g. those of validation.
+
+    Raises:
+        UserError: the task has no script.
+    """
+    tools = _compete(task, instances, RANDOM_TOOLS, FINALISTS, jobs, None)
+    best: Floats = tools.designs[tools.chosen[tools.returns.mean(axis=1).argmax()]]
+    return best
+
+
 def _single_tools(
     task: Task, random_tools: int, finalists: int, jobs: int, tried: pd.DataFrame | None
 ) -> Iterator[Point]:
     """Yield what the best single tool reaches, and what the best tool of each instance does.
 
-    All tools play the first `GOALS` instances, and the best of them play all. The single tool's return and success are
-    the highest means that one tool reaches, and need not be those of the same tool.
+    The single tool's return and success are the highest means that one tool reaches, and need not be those of the same
+    tool.
     """
-    instances = task.evaluation_instances()
+    tools = _compete(task, task.evaluation_instances(), random_tools, finalists, jobs, tried)
+    designs, chosen, returns, successes = tools.designs, tools.chosen, tools.returns, tools.successes
+    earns, solves = int(returns.mean(axis=1).argmax()), int(successes.mean(axis=1).argmax())
+    source = f"tool {chosen[earns]} by return, tool {chosen[solves]} by success, of {len(designs)}"
+    yield Point(SINGLE_TOOL, returns[earns], successes[solves], len(designs), source)
+    sources = [f"tool {tool}" for tool in chosen[returns.argmax(axis=0)]]
+    source = f"for each instance the best of {len(chosen)} tools, the script's controller"
+    yield Point(ANY_TOOL, returns.max(axis=0), successes.max(axis=0), len(chosen), source, sources)
+
+
+class _Tools(NamedTuple):
+    """Tools that competed, and what the best of them reached."""
+
+    designs: Floats
+    """(K, D) normalised, all of them."""
+    chosen: NDArray[np.intp]
+    """(F,) numbers of the finalists, the best at first sight first."""
+    returns: Floats
+    """(F, N)."""
+    successes: Floats
+    """(F, N)."""
+
+
+def _compete(
+    task: Task, instances: Floats, random_tools: int, finalists: int, jobs: int, tried: pd.DataFrame | None
+) -> _Tools:
+    """Let all tools play the first `GOALS` of `instances` (N, I), and the best of them all instances."""
     first = instances[:GOALS]
     designs = tools_of(task, first, random_tools)
     if tried is not None and len(tried) == len(designs) * len(first):
@@ -278,13 +318,7 @@ def _single_tools(
         early, _ = _play_all(task, designs, first, jobs)
     # What was played before chooses finalists and no more, so that an earlier scene cannot leave its numbers here.
     chosen = np.argsort(-early.mean(axis=1), kind="stable")[:finalists]
-    returns, successes = _play_all(task, designs[chosen], instances, jobs)
-    earns, solves = int(returns.mean(axis=1).argmax()), int(successes.mean(axis=1).argmax())
-    source = f"tool {chosen[earns]} by return, tool {chosen[solves]} by success, of {len(designs)}"
-    yield Point(SINGLE_TOOL, returns[earns], successes[solves], len(designs), source)
-    sources = [f"tool {tool}" for tool in chosen[returns.argmax(axis=0)]]
-    source = f"for each instance the best of {len(chosen)} tools, the script's controller"
-    yield Point(ANY_TOOL, returns.max(axis=0), successes.max(axis=0), len(chosen), source, sources)
+    return _Tools(designs, chosen, *_play_all(task, designs[chosen], instances, jobs))
 
 
 def _play_all(task: Task, designs: Floats, instances: Floats, jobs: int) -> tuple[Floats, Floats]:

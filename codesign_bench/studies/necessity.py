@@ -58,19 +58,19 @@ QUESTIONS = (
         "co_design.one_tool",
         "hwasp_minimal",
         "fixed_tool",
-        "learning one tool and its control beats learning control of the middle of the design space",
+        "learning one tool and its control beats learning control of a good tool that is given",
     ),
     Question(
         "co_design.tool_per_goal",
         "gnn_ppo",
         "fixed_tool",
-        "learning a tool per goal and its control beats learning control of the middle of the design space",
+        "learning a tool per goal and its control beats learning control of a good tool that is given",
     ),
     Question(
-        "chosen_tool",
+        "given_tool",
         "fixed_tool",
         "random_tool",
-        "training with the tool that is used beats training with random tools",
+        "control of a good tool beats control of the middle one that was learned with random tools",
     ),
 )
 METHODS = tuple(dict.fromkeys(name for question in QUESTIONS for name in (question.with_it, question.without)))

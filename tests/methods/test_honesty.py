@@ -17,8 +17,10 @@ import torch
 from codesign_bench.config.profiles import profiles
 from codesign_bench.config.resolve import resolve
 from codesign_bench.errors import UserError
+from codesign_bench.evaluation.reference_points import single_tool
 from codesign_bench.learning.actor import Actor
 from codesign_bench.method import Method, Problem, load_method
+from codesign_bench.registry import built_in
 from codesign_bench.seeding import Streams
 from codesign_bench.task import Singles, Task, load_task, task_names
 from codesign_bench.task.episodes import Episodes
@@ -94,6 +96,14 @@ def test_a_given_tool_is_the_one_that_is_used_for_every_goal(push: Task) -> None
         np.testing.assert_array_equal(acted, np.float32(given) * np.ones((len(acted), 1), np.float32))
     with pytest.raises(UserError, match=r"unit_design has 2 numbers; the tools of 'push' have 5"):
         resolve(method_class, "push", "laptop", ["unit_design=0,0"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", built_in("tasks"))
+def test_the_tool_that_is_given_does_most_on_instances_that_judge_nobody(name: str) -> None:
+    task = load_task(name)
+    given = resolve(load_method("fixed_tool"), name, "laptop").method.unit_design
+    np.testing.assert_allclose(given, single_tool(task, task.validation_instances()), atol=6e-4)
 
 
 def test_contextual_cma_gives_every_goal_its_tool(make_method: MakeMethod, push: Task) -> None:

@@ -71,6 +71,9 @@ def test_the_picture_shows_every_tool_and_the_numbers() -> None:
     assert dots["random"][:4] == [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0], [3.0, 4.0]]
     assert "push, climbed (1)" in axes.get_title(loc="left")
     assert "rank correlation 0.00" in axes.get_title(loc="left")
+    (legend,) = drawn.legends
+    place = legend.get_window_extent()
+    assert drawn.bbox.x0 <= place.x0 < place.x1 <= drawn.bbox.x1
 
 
 def test_other_variants_alone_are_refused() -> None:

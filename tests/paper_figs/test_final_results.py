@@ -86,9 +86,10 @@ def test_the_picture_shows_the_table() -> None:
     frame = pd.concat([cells("gnn_ppo", finals), cells("cma_rl", [2.0] * 3), cells("gnn_ppo", [8.0], task="scoop")])
     drawn = {axes.get_title(): axes for axes in figure.draw(frame).axes if axes.get_visible()}
     assert set(drawn) == {"push", "scoop"}
-    places = {line.get_gid(): line.get_xdata()[0] for line in drawn["push"].lines if line.get_marker() == "o"}
+    dots = [line for line in drawn["push"].lines if line.get_marker() == "o"]
+    places = {line.get_gid(): line.get_xdata()[0] for line in dots if line.get_gid()}
     assert places == pytest.approx({"gnn_ppo": 0.6, "cma_rl": 0.2})
-    seeds = [list(line.get_xdata()) for line in drawn["push"].lines if line.get_marker() == "."]
+    seeds = [list(line.get_xdata()) for line in dots if not line.get_gid()]
     assert seeds == [pytest.approx([0.5, 0.6, 0.7]), pytest.approx([0.2] * 3)]
     assert [text.get_text() for text in drawn["push"].get_yticklabels()] == ["gnn_ppo (3)", "cma_rl (3)"]
 

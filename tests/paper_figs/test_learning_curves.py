@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from codesign_bench.errors import UserError
+from codesign_bench.method import load_method, method_names
 from codesign_bench.registry import load_module
 
 learning_curves = load_module("paper_figs", "learning_curves")
@@ -102,6 +103,14 @@ def test_the_legend_counts_seeds_and_starts_with_the_papers_methods() -> None:
     third_party, own = three_seeds("push", "a_third_party"), three_seeds("push", "gnn_ppo")
     frame = pd.concat([third_party, cell("push", "cma_es", 0, [0, 0, 0]), own])
     assert legend(learning_curves.draw(frame)) == ["gnn_ppo (n=3)", "cma_es (n=1)", "a_third_party (n=3)"]
+
+
+def test_the_legend_lies_within_the_figure_with_every_method_that_there_is() -> None:
+    for methods in (method_names(), method_names()[:2]):
+        cells = [three_seeds("push", name).assign(label=load_method(name).label) for name in methods]
+        figure = learning_curves.draw(pd.concat(cells, ignore_index=True))
+        place = figure.legends[0].get_window_extent()
+        assert figure.bbox.x0 <= place.x0 < place.x1 <= figure.bbox.x1
 
 
 def test_a_label_column_names_the_methods() -> None:

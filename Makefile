@@ -113,7 +113,7 @@ clean: ## remove the environment and what tools left behind; results stay
 	touch $@
 
 .venv/installed-test: .venv/installed
-	$(PIP) install $(PIP_FLAGS) -c constraints.txt -e ".[test]"
+	$(PIP) install $(PIP_FLAGS) -c constraints.txt -e ".[sb3,test,torchrl]"
 	touch $@
 
 .venv/installed-docs: .venv/installed

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["SB3VecEnv", "TorchRLEnv"]
 
-_HOMES = {"SB3VecEnv": ("sb3", "stable_baselines3"), "TorchRLEnv": ("torchrl", "torchrl")}
-"""Class -> its module, which is also the name of the extra, and the library that it needs."""
+_HOMES = {"SB3VecEnv": "sb3", "TorchRLEnv": "torchrl"}
+"""Class -> its module, which is also the name of the extra."""
 
 
 def __getattr__(name: str) -> Any:
@@ -30,14 +30,13 @@ def __getattr__(name: str) -> Any:
     """
     if name not in _HOMES:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    module, library = _HOMES[name]
+    extra = _HOMES[name]
     try:
-        return getattr(import_module(f"{__name__}.{module}"), name)
+        return getattr(import_module(f"{__name__}.{extra}"), name)
     except ModuleNotFoundError as error:
-        if error.name != library:
-            raise
-        extra = f"pip install 'codesign-bench[{module}]'"
-        raise UnavailableError(f"{name} needs {library}, which is not installed: {extra}") from error
+        library = (error.name or "").partition(".")[0]
+        install = f"pip install 'codesign-bench[{extra}]'"
+        raise UnavailableError(f"{name} needs {library}, which is not installed: {install}") from error
 
 
 def __dir__() -> list[str]:

@@ -77,6 +77,11 @@ class TorchRLEnv(EnvBase):
         entries["reward"] = self._column(reward.astype(np.float32))
         return entries
 
+    def close(self, **keywords: Any) -> None:
+        """Give up the simulator."""
+        self.vector_env.close()
+        super().close(**keywords)
+
     def _set_seed(self, seed: int | None) -> None:
         self._seed = seed
 

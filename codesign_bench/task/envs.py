@@ -6,6 +6,7 @@ task; a task is loaded when its environment is made.
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from typing import Any
 
@@ -182,6 +183,8 @@ class ToolVectorEnv(NotCopied, VectorEnv[Any, Any, Any]):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._rollouts = Rollouts(self.task, num_envs, tradeoff)
         self.metadata = {**self.metadata, **_rendering(self.task, self._rollouts, render_mode)}
+        # A learner that holds environments may outlive the physics engine when Python ends: give up its worlds before.
+        weakref.finalize(self, self._rollouts.close)
         self._generators: list[np.random.Generator] = [seeding.np_random()[0] for _ in range(num_envs)]
 
     def reset(
@@ -254,6 +257,10 @@ class ToolVectorEnv(NotCopied, VectorEnv[Any, Any, Any]):
         if self.render_mode != RGB_ARRAY:
             return None
         return tuple(self._rollouts.render(slot) for slot in range(self.num_envs))
+
+    def close_extras(self, **keywords: Any) -> None:
+        """Give up the simulator; `close` calls this once."""
+        self._rollouts.close()
 
     def _begin(self, slots: Slots) -> None:
         self._rollouts.reset(slots, self._rollouts.sample([self._generators[slot] for slot in slots]))

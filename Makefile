@@ -73,10 +73,10 @@ test-oldest: .venv-oldest/installed ## run the fast tests with the oldest packag
 test-newest: .venv-newest/installed ## run the fast tests with the newest packages, on the newest Python
 	OMP_NUM_THREADS=1 .venv-newest/bin/python $(FAST_TESTS) $(TESTS)
 
-.venv-oldest/installed: $(SETUP) .ci/oldest
+.venv-oldest/installed: $(SETUP) tests/oldest_constraints.py
 	@test -n "$(OLDEST)" || { echo "no Python 3.10 to 3.12 found: name one with make OLDEST=..." >&2; exit 1; }
 	$(OLDEST) -m venv .venv-oldest
-	.venv-oldest/bin/python .ci/oldest > .venv-oldest/constraints.txt
+	.venv-oldest/bin/python tests/oldest_constraints.py > .venv-oldest/constraints.txt
 	$(call install_torch,.venv-oldest/bin/python,-c .venv-oldest/constraints.txt)
 	.venv-oldest/bin/python -m pip install $(PIP_FLAGS) -c .venv-oldest/constraints.txt -e ".[test]"
 	touch $@

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from packaging.version import Version
 
 from codesign_bench.storage.files import Outputs, encoded
 from codesign_bench.storage.json_fields import LARGEST_WHOLE, MOST_CHARACTERS
@@ -111,6 +110,7 @@ def parse_table(content: bytes, form: Form) -> pd.DataFrame:
         ValueError, csv.Error, OverflowError: it is not a table of this form.
     """
     import pandas as pd  # imported here because it takes a second, which `--help` need not pay
+    from packaging.version import Version
 
     _check_lines(content)
     # Numbers keep their last digit: by default since pandas 3.1, before only if that is asked for.

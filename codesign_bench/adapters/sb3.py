@@ -24,7 +24,7 @@ class SB3VecEnv(VecEnv):
     limit ended the episode, so that learners bootstrap there. The infos of last steps also have `success`, as those of
     `ToolEnv`, and once more as `is_success`, from which stable-baselines3 logs `rollout/success_rate`.
 
-    Episodes and infos are those of stable-baselines3's own `DummyVecEnv` around as many `ToolEnv`s, apart from
+    Episodes and infos are those of stable-baselines3's own `DummyVecEnv` around as many of `ToolEnv`, apart from
     `is_success`. `seed(s)` and `set_options({"instance": (I,) array})`, or a list of such options, take effect at the
     next `reset`. Wrap it in `VecMonitor` for returns and lengths of episodes.
 

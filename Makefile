@@ -10,8 +10,11 @@ unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
 PYTHON ?= $(shell for name in python3.11 python3.10 python3.12 python3.13 python3; do \
 	$$name -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null && { echo $$name; break; }; done)
-# The newest Python here; its 3D tasks use another build of the physics engine.
-NEWEST ?= $(shell for name in python3.13 python3.12 python3; do command -v $$name >/dev/null && { echo $$name; break; }; done)
+# The oldest and the newest Python here; the 3D tasks of the newest use another build of the physics engine.
+OLDEST ?= $(shell for name in python3.10 python3.11 python3.12; do \
+	$$name -c '' 2>/dev/null && { echo $$name; break; }; done)
+NEWEST ?= $(shell for name in python3.13 python3.12 python3; do \
+	$$name -c '' 2>/dev/null && { echo $$name; break; }; done)
 PIP_FLAGS ?=
 # Where to look for PyTorch without CUDA, which is several GB smaller; empty: take what the default index gives.
 TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
@@ -21,6 +24,9 @@ SETUP := setup.cfg pyproject.toml constraints.txt
 
 # Processes that run the fast tests; the tests of a file stay together, for they share what is made once for a file.
 WORKERS ?= 2
+FAST_TESTS := -m pytest -q -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+# What test-oldest and test-newest run, for example TESTS=tests/stats; empty: all fast tests.
+TESTS ?=
 NUMERIC_TESTS := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -p no:cacheprovider -m "numeric and not slow"
 
 TASK ?= push
@@ -37,7 +43,16 @@ WITHOUT_AVX := ATEN_CPU_CAPABILITY=default MKL_CBWR=COMPATIBLE ONEDNN_MAX_CPU_IS
 	NPY_DISABLE_CPU_FEATURES=X86_V3,AVX2,FMA3,X86_V4,AVX512F,AVX512_SKX,AVX512_ICL,AVX512_SPR \
 	GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA
 
-.PHONY: help run test test-environments test-portable without-avx512 without-avx check slow docs docs-links package install clean
+# Installs PyTorch without CUDA by the Python $(1), with the constraints $(2). The index may be out of reach behind a
+# mirror; then the default index has to do, later.
+define install_torch
+@if [ -n "$(TORCH_INDEX)" ] && $(1) -c \
+	'import sys, urllib.request as r; r.urlopen(sys.argv[1], timeout=10)' $(TORCH_INDEX)/torch/ 2>/dev/null; then \
+	set -x; $(1) -m pip install $(PIP_FLAGS) --extra-index-url $(TORCH_INDEX) $(2) torch; \
+fi
+endef
+
+.PHONY: help run test test-oldest test-newest test-environments test-portable without-avx512 without-avx check slow docs docs-links package install clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 22
@@ -50,7 +65,27 @@ test: .venv/installed-test ## set up, check style and types, run the fast tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+	OMP_NUM_THREADS=1 $(BIN)/python $(FAST_TESTS)
+
+test-oldest: .venv-oldest/installed ## run the fast tests with the oldest packages that setup.cfg allows (a part: TESTS=tests/stats)
+	OMP_NUM_THREADS=1 .venv-oldest/bin/python $(FAST_TESTS) $(TESTS)
+
+test-newest: .venv-newest/installed ## run the fast tests with the newest packages, on the newest Python
+	OMP_NUM_THREADS=1 .venv-newest/bin/python $(FAST_TESTS) $(TESTS)
+
+.venv-oldest/installed: $(SETUP) tests/oldest_constraints.py
+	@test -n "$(OLDEST)" || { echo "no Python 3.10 to 3.12 found: name one with make OLDEST=..." >&2; exit 1; }
+	$(OLDEST) -m venv .venv-oldest
+	.venv-oldest/bin/python tests/oldest_constraints.py > .venv-oldest/constraints.txt
+	$(call install_torch,.venv-oldest/bin/python,-c .venv-oldest/constraints.txt)
+	.venv-oldest/bin/python -m pip install $(PIP_FLAGS) -c .venv-oldest/constraints.txt -e ".[test]"
+	touch $@
+
+.venv-newest/installed: $(SETUP)
+	$(NEWEST) -m venv --clear .venv-newest
+	$(call install_torch,.venv-newest/bin/python,)
+	.venv-newest/bin/python -m pip install $(PIP_FLAGS) -e ".[sb3,test,torchrl]"
+	touch $@
 
 test-portable: .venv/installed-test ## run the tests that compare numbers under other instruction sets
 	$(MAKE) --no-print-directory -j2 --output-sync=target without-avx512 without-avx
@@ -91,7 +126,7 @@ package: ## build the wheels of program and reference results, install them in a
 install: .venv/installed-test ## set up an environment for development in .venv
 
 clean: ## remove the environment and what tools left behind; results stay
-	rm -rf .venv .venv-environments build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache
+	rm -rf .venv .venv-oldest .venv-newest .venv-environments build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache
 	rm -rf reference_package/build reference_package/*.egg-info reference_package/codesign_bench_reference/reference
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
@@ -100,12 +135,8 @@ clean: ## remove the environment and what tools left behind; results stay
 	$(PYTHON) -m venv .venv
 	touch $@
 
-# The index may be out of reach behind a mirror; then the default index has to do.
 .venv/torch: .venv/made constraints.txt
-	@if [ -n "$(TORCH_INDEX)" ] && $(BIN)/python -c \
-		'import sys, urllib.request as r; r.urlopen(sys.argv[1], timeout=10)' $(TORCH_INDEX)/torch/ 2>/dev/null; then \
-		set -x; $(PIP) install $(PIP_FLAGS) --extra-index-url $(TORCH_INDEX) -c constraints.txt torch; \
-	fi
+	$(call install_torch,$(BIN)/python,-c constraints.txt)
 	touch $@
 
 .venv/installed: .venv/torch $(SETUP)
@@ -113,7 +144,7 @@ clean: ## remove the environment and what tools left behind; results stay
 	touch $@
 
 .venv/installed-test: .venv/installed
-	$(PIP) install $(PIP_FLAGS) -c constraints.txt -e ".[test]"
+	$(PIP) install $(PIP_FLAGS) -c constraints.txt -e ".[sb3,test,torchrl]"
 	touch $@
 
 .venv/installed-docs: .venv/installed

@@ -11,7 +11,7 @@ import pkgutil
 from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
-from types import ModuleType
+from types import GenericAlias, ModuleType
 from typing import Any
 
 from codesign_bench.errors import UnavailableError, UserError, in_one_line, unknown_name
@@ -132,6 +132,7 @@ def single_subclass(module: ModuleType, base: type) -> Any:
     found = [
         member
         for name, member in inspect.getmembers(module, inspect.isclass)
+        if not isinstance(member, GenericAlias)  # an alias of a generic type, which Python 3.10 takes for a class
         if issubclass(member, base) and member.__module__ == module.__name__ and not name.startswith("_")
     ]
     if len(found) != 1:

@@ -51,7 +51,9 @@ TESTED_ELSEWHERE = {
 """Modules without a test file of their own -> why, and which tests cover them."""
 
 OF_NO_MODULE = {
+    "tests/adapters/test_adapters.py": "of the package of adapters, where libraries are missing",
     "tests/claims/test_a_a.py": "of all rules that compare methods",
+    "tests/docs/test_adapters.py": "of the learners in docs/adapters.md",
     "tests/docs/test_contributing.py": "of what CONTRIBUTING.md writes out",
     "tests/docs/test_examples.py": "of the files in docs/examples",
     "tests/docs/test_make_task_pages.py": "of the script docs/make_task_pages.py",
@@ -150,6 +152,12 @@ def test_figures_are_drawn_from_results_alone() -> None:
     modules = {module for path in files("paper_figs") for module in imported(path)}
     assert {module.split(".")[0] for module in modules} <= allowed
     assert offences(files("paper_figs"), below("methods", "tasks", "method", "task", "learning", "sweep")) == []
+
+
+def test_adapters_know_tasks_alone() -> None:
+    allowed = ("codesign_bench.adapters", "codesign_bench.errors", "codesign_bench.task")
+    modules = {module for path in files("codesign_bench/adapters") for module in imported(path)}
+    assert [one for one in sorted(modules) if one.startswith("codesign_bench") and not one.startswith(allowed)] == []
 
 
 def test_what_is_shared_by_methods_knows_neither_results_nor_running() -> None:

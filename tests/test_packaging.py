@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import configparser
 import os
 import re
 import shutil
@@ -12,6 +13,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
+
+from oldest_constraints import constraints
 
 ROOT = Path(__file__).resolve().parent.parent
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.y*ml"))
@@ -111,6 +114,16 @@ def test_a_workflow_may_only_read_and_pins_its_actions_by_commit(workflow: Path)
 def test_what_a_workflow_runs_exists_and_may_be_run(script: Path) -> None:
     assert os.access(script, os.X_OK)
     assert any(f".ci/{script.name}" in workflow.read_text() for workflow in WORKFLOWS)
+
+
+def test_the_oldest_releases_are_those_of_the_lower_bounds() -> None:
+    setup = configparser.ConfigParser()
+    setup.read(ROOT / "setup.cfg")
+    required = setup["options"]["install_requires"].strip().splitlines()
+    assert all(" >=" in line for line in required)
+    pins = constraints()
+    assert [line.replace(" >=", "==", 1) for line in required] == pins[: len(required)]
+    assert any(pin.startswith("pytest==") for pin in pins), "extras count, too"
 
 
 @pytest.mark.slow

@@ -9,13 +9,12 @@ import time
 from statistics import median
 from typing import Any
 
-import gymnasium
 import numpy as np
 
 from codesign_bench.benchmarks.workload import Speed, Workload, configured
 from codesign_bench.machine import peak_megabytes
 from codesign_bench.task import Task, load_task
-from codesign_bench.task.envs import ToolVectorEnv, environment_id, register_environments
+from codesign_bench.task.envs import environment_id, register_environments
 from codesign_bench.task.episodes import Episodes
 
 USUAL_ROLLOUT_STEPS, USUAL_MINIBATCHES = 300, 3
@@ -32,7 +31,9 @@ def stable_baselines3_alone(work: Workload) -> Speed:
 
 def stable_baselines3_batched(work: Workload) -> Speed:
     """Measure stable-baselines3's PPO with our batched environments behind its interface."""
-    return _stable_baselines3(work, _batched(work))
+    from codesign_bench.adapters import SB3VecEnv
+
+    return _stable_baselines3(work, SB3VecEnv(work.task, work.environments))
 
 
 def _stable_baselines3(work: Workload, environments: Any) -> Speed:
@@ -61,53 +62,6 @@ def _stable_baselines3(work: Workload, environments: Any) -> Speed:
         rollouts.append(samples / (collected - started))
         updates.append(samples * work.epochs / (time.perf_counter() - collected))
     return Speed(median(rollouts), median(updates), peak_megabytes())
-
-
-def _batched(work: Workload) -> Any:
-    """Return our batched environments with stable-baselines3's interface: an episode's end begins the next at once."""
-    from stable_baselines3.common.vec_env import VecEnv
-
-    inner = ToolVectorEnv(work.task, work.environments)
-
-    class Batched(VecEnv):
-        def __init__(self) -> None:
-            super().__init__(inner.num_envs, inner.single_observation_space, inner.single_action_space)
-            self.actions: Any = None
-
-        def reset(self) -> Any:
-            return inner.reset(seed=0)[0]
-
-        def step_async(self, actions: Any) -> None:
-            self.actions = actions
-
-        def step_wait(self) -> Any:
-            observation, reward, terminated, truncated, _ = inner.step(self.actions)
-            over = terminated | truncated
-            infos: list[dict[str, Any]] = [{} for _ in range(inner.num_envs)]
-            if over.any():
-                for slot in np.flatnonzero(over):
-                    infos[slot] = {"terminal_observation": observation[slot], "TimeLimit.truncated": truncated[slot]}
-                observation = inner.reset(options={"reset_mask": over})[0]
-            return observation, reward.astype(np.float32), over, infos
-
-        def close(self) -> None:
-            pass
-
-        def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-            return [getattr(inner, attr_name, None)] * inner.num_envs
-
-        def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-            raise NotImplementedError  # abstract in the base class, and no learner here calls it
-
-        def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **keywords: Any) -> list[Any]:
-            raise NotImplementedError  # likewise
-
-        def env_is_wrapped(
-            self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: Any = None
-        ) -> Any:
-            return [False] * inner.num_envs
-
-    return Batched()
 
 
 def usual_way(work: Workload) -> Speed:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import typing
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -149,7 +148,7 @@ def method_config(config_class: type, stored: Settings) -> Any:
     Raises:
         UserError: it is incompatible with the method's current configuration.
     """
-    hints = typing.get_type_hints(config_class)
+    hints = kinds_of(config_class, limits=False)
     try:
         values = {name: _restore(hints[name], entry.value) for name, entry in stored.items()}
         with stored_values():

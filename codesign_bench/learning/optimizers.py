@@ -12,7 +12,11 @@ from codesign_bench.learning.checkpointing import Optimizers
 
 def adam(parameters: Iterable[nn.Parameter], learning_rate: float) -> torch.optim.Adam:
     """Return Adam (Kingma and Ba 2015) for the trainable ones of `parameters`."""
-    return torch.optim.Adam([p for p in parameters if p.requires_grad], lr=learning_rate, fused=True)
+    trainable = [p for p in parameters if p.requires_grad]
+    try:
+        return torch.optim.Adam(trainable, lr=learning_rate, fused=True)
+    except RuntimeError:  # PyTorch before 2.4 can fuse the steps on GPUs alone
+        return torch.optim.Adam(trainable, lr=learning_rate)
 
 
 class Annealing:

@@ -39,7 +39,8 @@ def locked(folder: Path, timeout: float = 0.0) -> Iterator[None]:
         if error.errno not in WITHOUT_LOCKS:
             raise
         lock = filelock.SoftFileLock(folder / HOLDER_FILE)
-        lock.acquire(timeout=timeout)
+        # The first try may do no more than remove the file of a process that is gone.
+        lock.acquire(timeout=max(timeout, 0.1), poll_interval=0.02)
     try:
         yield
     finally:

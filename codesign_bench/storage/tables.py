@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,9 +110,12 @@ def parse_table(content: bytes, form: Form) -> pd.DataFrame:
         ValueError, csv.Error, OverflowError: it is not a table of this form.
     """
     import pandas as pd  # imported here because it takes a second, which `--help` need not pay
+    from packaging.version import Version
 
     _check_lines(content)
-    table = pd.read_csv(io.BytesIO(content), encoding="utf-8", low_memory=False)
+    # Numbers keep their last digit: by default since pandas 3.1, before only if that is asked for.
+    exact: Any = {} if Version(pd.__version__) >= Version("3.1") else {"float_precision": "round_trip"}
+    table = pd.read_csv(io.BytesIO(content), encoding="utf-8", low_memory=False, **exact)
     for name, kind in form.columns.items():
         for column in _matching(table, name):
             _check_column(table[column], kind)

@@ -79,7 +79,7 @@ def checked_instance(instance: Any, space: Box, slots: Slots | None = None, coun
     return chosen
 
 
-def checked_mask(mask: Any, count: int) -> Slots:
+def checked_mask(mask: Any, count: int, what: str = "options['reset_mask']") -> Slots:
     """Return the slots that a mask (`count`,) of truth values chooses; None chooses all.
 
     Raises:
@@ -90,11 +90,11 @@ def checked_mask(mask: Any, count: int) -> Slots:
     values = np.asarray(mask)
     if values.shape != (count,) or values.dtype != np.bool_:
         raise ValueError(
-            f"options['reset_mask'] has shape {values.shape} and type {values.dtype}, not ({count},) and bool: "
+            f"{what} has shape {values.shape} and type {values.dtype}, not ({count},) and bool: "
             "one truth value for each environment"
         )
     if not values.any():
-        raise ValueError(f"options['reset_mask'] chooses none of the {count} environments")
+        raise ValueError(f"{what} chooses none of the {count} environments")
     return np.flatnonzero(values)
 
 

@@ -6,6 +6,7 @@ task; a task is loaded when its environment is made.
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from typing import Any
 
@@ -182,6 +183,8 @@ class ToolVectorEnv(NotCopied, VectorEnv[Any, Any, Any]):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._rollouts = Rollouts(self.task, num_envs, tradeoff)
         self.metadata = {**self.metadata, **_rendering(self.task, self._rollouts, render_mode)}
+        # A learner that holds environments may outlive the physics engine when Python ends: give up its worlds before.
+        weakref.finalize(self, self._rollouts.close)
         self._generators: list[np.random.Generator] = [seeding.np_random()[0] for _ in range(num_envs)]
 
     def reset(
@@ -207,7 +210,7 @@ class ToolVectorEnv(NotCopied, VectorEnv[Any, Any, Any]):
             self._begin(slots)
         else:
             self._rollouts.reset(slots, instances)
-        return self._rollouts.episodes.observation.copy(), {}
+        return self._observation(), {}
 
     def step(self, actions: Singles) -> tuple[Singles, Floats, Booleans, Booleans, dict[str, Any]]:
         """Step every environment with `actions` (B, D + C); those whose episode has ended begin the next one instead.
@@ -220,22 +223,44 @@ class ToolVectorEnv(NotCopied, VectorEnv[Any, Any, Any]):
             ValueError: the actions have another shape, or one is not finite, even that of an ended episode.
         """
         self._rollouts.need_start("step")
-        checked = checked_actions(actions, self.task.design_space, self.task.control_space, self.num_envs)
-        reward = np.zeros(self.num_envs)
-        terminated, truncated = np.zeros(self.num_envs, dtype=bool), np.zeros(self.num_envs, dtype=bool)
-        over, going = np.flatnonzero(self._rollouts.ended), np.flatnonzero(~self._rollouts.ended)
-        if len(going):
-            outcome = self._rollouts.step(going, checked[going])
-            reward[going], terminated[going], truncated[going] = outcome
-        if len(over):
-            self._begin(over)
-        return self._rollouts.episodes.observation.copy(), reward, terminated, truncated, self._info()
+        ended = self._rollouts.ended.copy()
+        outcome = self._take(actions, ~ended)
+        if ended.any():
+            self._begin(np.flatnonzero(ended))
+        return self._observation(), *outcome, self._info(~ended)
+
+    def advance(
+        self, actions: Singles, mask: Booleans | None = None
+    ) -> tuple[Singles, Floats, Booleans, Booleans, dict[str, Any]]:
+        """Step the environments of `mask` (B,), by default all, and begin no next episode; the others stay as they are.
+
+        For callers that begin the next episode themselves, by `reset(options={"reset_mask": ...})`.
+
+        Returns:
+            the same as `step`; reward 0, not terminated, not truncated, and no info where nothing was stepped.
+
+        Raises:
+            gymnasium.error.ResetNeeded: an episode of `mask` has ended or was never started.
+            ValueError: the actions or the mask have another shape, or an action is not finite.
+        """
+        chosen = np.zeros(self.num_envs, dtype=bool)
+        chosen[checked_mask(mask, self.num_envs, "mask")] = True
+        if self._rollouts.ended[chosen].any():
+            raise gymnasium.error.ResetNeeded(
+                "an episode has ended or was never started: call reset() before advance()"
+            )
+        outcome = self._take(actions, chosen)
+        return self._observation(), *outcome, self._info(chosen)
 
     def render(self) -> tuple[Any, ...] | None:
         """Return a picture of every scene with `render_mode="rgb_array"`; else None."""
         if self.render_mode != RGB_ARRAY:
             return None
         return tuple(self._rollouts.render(slot) for slot in range(self.num_envs))
+
+    def close_extras(self, **keywords: Any) -> None:
+        """Give up the simulator; `close` calls this once."""
+        self._rollouts.close()
 
     def _begin(self, slots: Slots) -> None:
         self._rollouts.reset(slots, self._rollouts.sample([self._generators[slot] for slot in slots]))
@@ -250,10 +275,23 @@ class ToolVectorEnv(NotCopied, VectorEnv[Any, Any, Any]):
             raise ValueError(f"{len(seeds)} seeds given for {self.num_envs} environments")
         return {slot: seeding.np_random(int(value))[0] for slot, value in enumerate(seeds) if value is not None}
 
-    def _info(self) -> dict[str, Any]:
+    def _take(self, actions: Singles, mask: Booleans) -> tuple[Floats, Booleans, Booleans]:
+        """Take the steps of the environments of `mask`; return reward, terminated and truncated, each (B,)."""
+        checked = checked_actions(actions, self.task.design_space, self.task.control_space, self.num_envs)
+        reward = np.zeros(self.num_envs)
+        terminated, truncated = np.zeros(self.num_envs, dtype=bool), np.zeros(self.num_envs, dtype=bool)
+        slots = np.flatnonzero(mask)
+        if len(slots):
+            reward[slots], terminated[slots], truncated[slots] = self._rollouts.step(slots, checked[slots])
+        return reward, terminated, truncated
+
+    def _observation(self) -> Singles:
+        return self._rollouts.episodes.observation.copy()
+
+    def _info(self, stepped: Booleans) -> dict[str, Any]:
         """Return the infos of `ToolEnv`, merged as `VectorEnv` merges them: masks have the prefix `_`."""
         episodes, info = self._rollouts.episodes, dict[str, Any]()
-        controlled, ended = self._rollouts.controlled, self._rollouts.ended
+        controlled, ended = stepped & self._rollouts.controlled, stepped & self._rollouts.ended
         if controlled.any():
             terms: dict[str, Any] = {}
             for name, values in episodes.reward_terms.items():

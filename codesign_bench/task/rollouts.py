@@ -21,7 +21,7 @@ class Rollouts(NotCopied):
 
     def __init__(self, task: Task, num_slots: int, tradeoff: Tradeoff | None) -> None:
         self.task = task
-        self.episodes = Episodes(task, num_slots, tradeoff)
+        self._episodes: Episodes | None = Episodes(task, num_slots, tradeoff)
         self.designing: Booleans = np.zeros(num_slots, dtype=bool)
         """(B,) whether the next step is the design step."""
         self.ended: Booleans = np.ones(num_slots, dtype=bool)
@@ -30,6 +30,21 @@ class Rollouts(NotCopied):
         """(B,) whether an episode was ever started."""
         self.controlled: Booleans = np.zeros(num_slots, dtype=bool)
         """(B,) whether the last step was a control step."""
+
+    @property
+    def episodes(self) -> Episodes:
+        """The episodes themselves.
+
+        Raises:
+            gymnasium.error.ClosedEnvironmentError: they were given up by `close`.
+        """
+        if self._episodes is None:
+            raise gymnasium.error.ClosedEnvironmentError("the environment was closed; make another one")
+        return self._episodes
+
+    def close(self) -> None:
+        """Give up the simulator."""
+        self._episodes = None
 
     def reset(self, slots: Slots, instances: Floats) -> None:
         """Begin episodes of `instances` (b, I) in `slots` (b,)."""

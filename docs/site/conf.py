@@ -29,6 +29,8 @@ nb_merge_streams = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
+# The libraries that our adapters extend need not be installed, and their own docstrings are not ours to show.
+autodoc_mock_imports = ["stable_baselines3", "tensordict", "torchrl"]
 # Types of arrays keep their names; their shapes are in the docstrings.
 autodoc_type_aliases = {name: name for name in ("Booleans", "Floats", "Frame", "Singles", "Slots", "Array")}
 python_maximum_signature_line_length = 88

@@ -62,7 +62,7 @@ def test_returns_come_with_their_place_between_idling_and_the_best_known(tmp_pat
     points(tmp_path)
     frame = load_results(tmp_path).set_index(["task", "variant"])["normalized_score"]
     assert frame.loc["push", "default"].tolist() == [0.0, 0.5, 1.5]
-    assert frame.loc["push", "cutout-0.40"] == 0.75, "judged on the same instances"
+    assert frame.loc[[("push", "cutout-0.40")]].tolist() == [0.75], "judged on the same instances"
     others = frame.drop([("push", "default"), ("push", "cutout-0.40")])
     assert len(others) == 3
     assert others.isna().all(), "without points, with another reward, of an axis that is not known here"

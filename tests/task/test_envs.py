@@ -12,7 +12,7 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from codesign_bench.task import load_task, task_names
-from codesign_bench.task.envs import ToolEnv, environment_id, register_environments
+from codesign_bench.task.envs import ToolEnv, ToolVectorEnv, environment_id, register_environments
 
 register_environments()
 EVERY_TASK = pytest.mark.parametrize("task_name", task_names())
@@ -152,6 +152,41 @@ def test_a_reset_can_be_limited_to_some_environments(task_name: str) -> None:
     after, _ = envs.reset(seed=[None, 5], options={"reset_mask": np.array([False, True])})
     np.testing.assert_array_equal(after[0], before[0])
     np.testing.assert_array_equal(after[1], ToolEnv(task_name).reset(seed=5)[0])
+
+
+def test_a_batch_can_be_stepped_in_part_and_begins_no_episode_by_itself(toy: None) -> None:
+    together, one = ToolVectorEnv("toy_reach", 2), ToolEnv("toy_reach")
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        together.advance(np.zeros((2, 2)))
+    start, _ = together.reset(seed=3)
+    one.reset(seed=3)
+    only_first, actions = np.array([True, False]), np.full((2, 2), 0.5)
+    ended = False
+    while not ended:
+        observation, reward, terminated, truncated, info = together.advance(actions, only_first)
+        expected = one.step(actions[0])
+        ended = expected[2] or expected[3]
+        np.testing.assert_array_equal(observation[0], expected[0])
+        assert [reward[0], terminated[0], truncated[0]] == list(expected[1:4])
+        np.testing.assert_array_equal(observation[1], start[1])
+        assert [reward[1], terminated[1], truncated[1]] == [0.0, False, False]
+        assert not any(mask[1] for name, mask in info.items() if name.startswith("_"))
+    assert info["_success"].tolist() == [True, False]
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        together.advance(actions)
+    assert "success" not in together.advance(actions, ~only_first)[4], "of the episode that had ended before"
+    with pytest.raises(ValueError, match="mask has shape"):
+        together.advance(actions, np.array([True]))
+
+
+def test_a_closed_batch_gives_up_its_simulator(toy: None) -> None:
+    envs = ToolVectorEnv("toy_reach", 2)
+    envs.reset()
+    envs.close()
+    envs.close()
+    for refused in (envs.reset, lambda: envs.step(np.zeros((2, 2)))):
+        with pytest.raises(gymnasium.error.ClosedEnvironmentError):
+            refused()
 
 
 @EVERY_TASK

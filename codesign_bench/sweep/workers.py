@@ -137,7 +137,9 @@ def _record_death(folder: Path, code: int) -> str:
                 trace = _end_of_log(folder) or message
                 record.ended(FAILED, failure=Failure(message, trace)).write(folder)
             elif record is None:
-                message = f"{message}: {_end_of_log(folder).strip()}"
+                # Nothing could be recorded: the line shows what went wrong, the file what led to it.
+                last = _end_of_log(folder).strip().rpartition("\n")[2].strip()
+                message = f"{message}: {last} (all in {folder / LOG_FILE})" if last else message
     except (filelock.Timeout, UserError) as error:
         return f"{message} ({error})"
     except OSError as error:

@@ -89,6 +89,18 @@ def test_a_cell_that_is_refused_before_its_record_is_told_in_a_line(tmp_path: Pa
     assert "unknown method 'toy_search'" in (outcome.cell.folder(tmp_path) / LOG_FILE).read_text()
 
 
+def test_a_process_that_dies_before_its_record_is_told_by_its_last_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "dies.py").write_text("import os\nos.write(2, b'one line\\nthe reason\\n')\nos._exit(3)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    outcome = run(toy_cell(), tmp_path / "runs", imported="dies")
+    log = outcome.cell.folder(tmp_path / "runs") / LOG_FILE
+    assert outcome.status == "failed"
+    assert outcome.message == f"{describe_exit(3)}: the reason (all in {log})"
+    assert log.read_text() == "one line\nthe reason\n"
+
+
 @pytest.mark.parametrize(
     ("code", "told"),
     [

@@ -1,5 +1,7 @@
 """Draw the gallery, docs/images/gallery: a small animation for every task and method, from shipped policies.
 
+A task without a shipped policy is played by its script.
+
     python docs/site/gallery.py [--results results/reference] [TASK ...]
 
 An animation shows the final policy of the first seed on the first two evaluation instances, whatever comes of them,
@@ -24,6 +26,7 @@ from PIL import Image
 import codesign_bench as cb
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.rendering import render_slot
+from codesign_bench.registry import built_in
 from codesign_bench.task import Behaviour, Task
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.play import play
@@ -31,6 +34,8 @@ from codesign_bench.task.play import play
 ROOT = Path(__file__).resolve().parents[2]
 GALLERY = ROOT / "docs" / "images" / "gallery"
 RECORD = "gallery.json"
+SCRIPT = "script"
+"""In place of a method's name."""
 EPISODES = 2
 WIDTH = 260
 """Pixels of one episode; two side by side fit a narrow screen."""
@@ -111,6 +116,14 @@ def shown(cell: Path, results: Path) -> tuple[dict[str, Any], bytes]:
     return entry, gif(pictures, period)
 
 
+def scripted(name: str) -> tuple[dict[str, Any], bytes]:
+    """Return the record and the animation of a task that its script plays."""
+    task = cb.load_task(name)
+    pictures, solved, period = draw(task, task.script())
+    entry = {"task": name, "method": SCRIPT, "task_version": task.version, "cell": None, "solved": solved}
+    return entry, gif(pictures, period)
+
+
 def main() -> int:
     """Draw the cells of the named tasks, or of all; return the exit code."""
     parser = argparse.ArgumentParser(description="Draw the gallery from shipped policies.")
@@ -130,14 +143,22 @@ def main() -> int:
         except UserError as error:
             print(f"left as it is: {task} {method}: {error}")
             continue
-        (GALLERY / f"{task}_{method}.gif").write_bytes(content)
-        known[task, method] = entry
-        print(
-            f"{task} {method}: {len(content) // 1000} kB, solved {entry['solved']}, "
-            f"as evaluated: {entry['as_evaluated']}"
-        )
-        path.write_text(json.dumps([known[key] for key in sorted(known)], indent=1) + "\n", encoding="utf-8")
+        keep(known, entry, content)
+    for task in options.tasks or built_in("tasks"):
+        if not any(of_task == task for of_task, method in known if method != SCRIPT):
+            keep(known, *scripted(task))
     return 0
+
+
+def keep(known: dict[tuple[str, str], dict[str, Any]], entry: dict[str, Any], content: bytes) -> None:
+    """Write an animation and its record beside the others."""
+    task, method = entry["task"], entry["method"]
+    (GALLERY / f"{task}_{method}.gif").write_bytes(content)
+    known[task, method] = entry
+    evaluated_so = f", as evaluated: {entry['as_evaluated']}" if entry["cell"] else ""
+    print(f"{task} {method}: {len(content) // 1000} kB, solved {entry['solved']}{evaluated_so}")
+    records = [known[key] for key in sorted(known)]
+    (GALLERY / RECORD).write_text(json.dumps(records, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

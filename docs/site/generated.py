@@ -22,10 +22,10 @@ from codesign_bench.method import load_method, method_names
 from codesign_bench.registry import built_in, load_module
 from codesign_bench.study import DEFAULT_STUDY, Study, load_study
 from codesign_bench.task import load_task
+from gallery import GALLERY, RECORD, SCRIPT
 
 RESULTS = ROOT / "results"
 REFERENCE = RESULTS / "reference"
-GALLERY = ROOT / "docs" / "images" / "gallery"
 INSERT = re.compile(r"^<!-- insert: (\w+) -->$", re.MULTILINE)
 """Where a hand-written page takes a generated part."""
 CODE = re.compile(r"^<!-- code: (\S+) (\w+) -->$", re.MULTILINE)
@@ -120,7 +120,7 @@ CHILDREN: dict[str, Callable[[], list[str]]] = {"docs/index.md": _handbook, "res
 
 def entries() -> list[dict[str, Any]]:
     """Return the records of the gallery's pictures."""
-    return json.loads((GALLERY / "gallery.json").read_text(encoding="utf-8"))
+    return json.loads((GALLERY / RECORD).read_text(encoding="utf-8"))
 
 
 def picture(entry: dict[str, Any], caption: str) -> str:
@@ -136,7 +136,7 @@ def in_motion(task: str) -> str:
     """Return the animation of a task's first method for the task's page, or nothing."""
     found = [entry for entry in entries() if entry["task"] == task]
     by_method = {entry["method"]: entry for entry in found}
-    shown = [by_method[method] for method in method_names() if method in by_method][:1]
+    shown = [by_method[method] for method in (*method_names(), SCRIPT) if method in by_method][:1]
     return "".join(
         cards(
             [picture(one, f"{one['method']}: {outcome(one)}.{former(one)} More in the {{doc}}`gallery </gallery>`.")],
@@ -213,8 +213,9 @@ def gallery() -> str:
     for task in built_in("tasks"):
         found = {entry["method"]: entry for entry in entries() if entry["task"] == task}
         parts.append(f"## {load_task(task).title}\n\n[{task}](docs/tasks/{task}.md): {lowered(asked(task))}")
-        if not found:
-            parts.append("No policy of this task is shipped yet.")
+        if set(found) <= {SCRIPT}:
+            caption = "No policy of this task is shipped yet; its script plays."
+            parts.append(cards(picture(entry, caption) for entry in found.values()) if found else caption)
             continue
         if note := former(next(iter(found.values()))):
             parts.append(f"Shown: {lowered(note.strip())}")

@@ -165,10 +165,18 @@ def test_code_of_a_file_is_shown_by_name() -> None:
 @pytest.mark.reference
 def test_every_shipped_policy_is_in_the_gallery_and_did_there_what_its_evaluation_says() -> None:
     shipped = {path.parts[-5:-3] for path in ROOT.glob("results/reference/*/*/default/seed-*/policy.safetensors")}
-    entries = generated.entries()
+    entries = [entry for entry in generated.entries() if entry["cell"]]
     assert {(entry["task"], entry["method"]) for entry in entries} == shipped
     assert [entry for entry in entries if not entry["as_evaluated"]] == []
     assert [entry["cell"] for entry in entries if not (ROOT / "results" / entry["cell"]).is_dir()] == []
+
+
+def test_every_task_is_in_motion_if_only_by_its_script() -> None:
+    assert generated.tasks_in_motion().count(":::{figure}") == len(built_in("tasks"))
+    assert {entry["task"] for entry in generated.entries()} == set(built_in("tasks"))
+    assert all(
+        entry["task_version"] == load_task(entry["task"]).version for entry in generated.entries() if not entry["cell"]
+    )
 
 
 def test_pictures_of_the_gallery_move_and_are_small() -> None:

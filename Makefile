@@ -82,9 +82,9 @@ test-newest: .venv-newest/installed ## run the fast tests with the newest packag
 	touch $@
 
 .venv-newest/installed: $(SETUP)
-	$(NEWEST) -m venv --clear .venv-newest
+	$(NEWEST) -m venv .venv-newest
 	$(call install_torch,.venv-newest/bin/python,)
-	.venv-newest/bin/python -m pip install $(PIP_FLAGS) -e ".[sb3,test,torchrl]"
+	.venv-newest/bin/python -m pip install $(PIP_FLAGS) --upgrade --upgrade-strategy eager -e ".[sb3,test,torchrl]"
 	touch $@
 
 test-portable: .venv/installed-test ## run the tests that compare numbers under other instruction sets

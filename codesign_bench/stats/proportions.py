@@ -22,8 +22,10 @@ def proportion_interval(
     """Return the interval of the probability of success, given `successes` of `trials`.
 
     Raises:
-        ValueError: there are no trials, or more successes than trials.
+        ValueError: there are no trials, or fewer successes than none or more than trials.
     """
+    if trials < 1 or not 0 <= successes <= trials:
+        raise ValueError(f"{successes} successes of {trials} trials")
     found = binomtest(successes, trials).proportion_ci(confidence_level=confidence, method=kind)
     return float(found.low), float(found.high)
 

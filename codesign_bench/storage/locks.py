@@ -8,8 +8,6 @@ the lock over, and on another host the file has to be removed by hand.
 from __future__ import annotations
 
 import errno
-import os
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -55,13 +53,9 @@ def _of_the_system(path: Path, timeout: float) -> filelock.BaseFileLock:
         filelock.Timeout: another process holds it.
         OSError: the file system has no locks, or the file cannot be made.
     """
-    lock = filelock.FileLock(path)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        lock.acquire(timeout=timeout)
-    if isinstance(lock, filelock.SoftFileLock):  # what newer versions of the library turn into for one of the errors
-        lock.release()
-        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+    # Without locks, the library would change to a lock of another kind on the same file, for one of the errors.
+    lock = filelock.FileLock(path, fallback_to_soft=False)
+    lock.acquire(timeout=timeout)
     return lock
 
 

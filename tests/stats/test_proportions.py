@@ -46,7 +46,7 @@ def test_wilsons_interval_by_hand() -> None:
 
 @pytest.mark.parametrize(("successes", "trials"), [(1, 0), (4, 3), (-1, 3)])
 def test_impossible_counts_are_refused(successes: int, trials: int) -> None:
-    with pytest.raises(ValueError):  # noqa: PT011 - each count has its own message, all of them scipy's
+    with pytest.raises(ValueError, match=f"{successes} successes of {trials} trials"):
         proportion_interval(successes, trials)
 
 

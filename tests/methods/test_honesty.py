@@ -31,9 +31,15 @@ PPO_BASED = ("gnn_ppo", "shared_arch", "hwasp_minimal")
 BUDGET = 10_000
 RATES = {"policy_learning_rate", "value_learning_rate"}
 DESIGN = {"design_credit", "design_learning_rate", "design_kl_threshold"}
+SEARCHED = {
+    *("batch_size", "minibatch_size", "epochs", "kl_threshold", "control_log_std", "gamma", "gae_lambda", "clip_ratio"),
+    *RATES,
+}
 TOLD = {
     ("shared_arch", "paper"): RATES,  # The paper's table of baselines prints their rates, one for all tasks.
     ("cma_rl", "paper"): RATES,
+    ("cma_rl", "laptop"): SEARCHED,  # by the common search, on push
+    ("cma_rl", "quick"): SEARCHED,
     ("hwasp_minimal", "laptop"): DESIGN,  # A bare vector needs larger steps than a network (ours).
     ("hwasp_minimal", "quick"): DESIGN,
 }

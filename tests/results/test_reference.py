@@ -42,7 +42,13 @@ FIRST = [next(group) for _, group in groupby(DEFAULTS, lambda cell: (cell.record
 PLAYABLE = [cell for cell in FIRST if (cell.folder / POLICY_FILE).exists()]
 CREDIT = "design_credit: stored separate, requested joint"
 """The default that changed since the cells were run, as the page of the results says."""
-SEARCHED = {("push", "cma_es"): ("popsize", "sigma0", "episodes_per_candidate")}
+SEARCHED = {
+    ("push", "cma_es"): ("popsize", "sigma0", "episodes_per_candidate"),
+    ("push", "cma_rl"): (
+        *("batch_size", "minibatch_size", "epochs", "policy_learning_rate", "value_learning_rate", "kl_threshold"),
+        *("control_log_std", "gamma", "gae_lambda", "clip_ratio", "popsize", "sigma0"),
+    ),
+}
 """Settings that the common search has found since."""
 FIRST_TRIALS = load_deployment(REFERENCE).query("kind == 'own' and trial == 1 and success == 1")
 TOOLS_THAT_WORKED = FIRST_TRIALS.groupby("task")[["task", "tool"]].tail(1).values.tolist()

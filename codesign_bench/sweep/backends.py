@@ -6,6 +6,7 @@ it raises `WorkersDied`; unfinished jobs resume from their checkpoints when they
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 from abc import ABC, abstractmethod
@@ -137,7 +138,7 @@ class DaskBackend(Backend):
         """
         try:
             self._client.submit(os.getpid, pure=False).result(timeout=WORKER_SECONDS)  # an adaptive cluster grows
-        except TimeoutError as error:
+        except asyncio.TimeoutError as error:  # another class than TimeoutError up to Python 3.10
             start = f"dask worker {self.scheduler} --nthreads 1"
             raise UserError(f"--scheduler {self.scheduler}: it has no worker; start one with: {start}") from error
 

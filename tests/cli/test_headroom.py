@@ -11,7 +11,9 @@ import pytest
 from builders import store_played_cell
 from codesign_bench.cli import main
 from codesign_bench.evaluation.reference_points import measure_missing
+from codesign_bench.storage.measurements import BEST_KNOWN_EPISODES
 from codesign_bench.storage.reference_points import BEST_KNOWN, load_reference_points
+from codesign_bench.storage.tables import read_table
 
 pytestmark = pytest.mark.usefixtures("toy")
 
@@ -48,7 +50,8 @@ def test_episodes_are_renewed_and_reference_points_with_them(
     printed = capsys.readouterr().out
     assert "toy_reach: 8 instances improved" in printed
     assert "measure them with: codesign-bench reference --task toy_reach" in printed
-    episodes = pd.read_csv(results / "best_known" / "toy_reach.csv")
+    episodes = read_table(results / "best_known" / "toy_reach.csv", BEST_KNOWN_EPISODES.form)
+    assert episodes is not None
     best = episodes.groupby("instance")["return"].max().mean()
     measure_missing(results, ["toy_reach"], [].append)
     point = load_reference_points(results).set_index("point").loc[BEST_KNOWN]

@@ -28,6 +28,7 @@ from codesign_bench.task import (
 )
 
 from ._planar import COLOURS, PLACE, Canvas, Clock, PlanarSimulator, View
+from ._sides import TwoSides
 from ._strip import (
     MIDDLE,
     SEGMENTS,
@@ -98,6 +99,8 @@ PHYSICS_PERIOD: Annotated[float, Given("s", OURS)] = 1.0 / 240.0
 """Of a physics step: a ball that hits a strip moves a fifth of its radius."""
 CLOCK = Clock(STEPS_PER_CONTROL, PHYSICS_PERIOD)
 
+
+SIDES_OF_GOAL = TwoSides(HOOP_DISTANCE, HOOP_HEIGHT)
 
 DESIGN = Box.of(
     tilt=(-TILT, TILT, "rad"),
@@ -224,35 +227,16 @@ class Bounce(Task):
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
         """Return (count, I) random instances; the hoop is left or right of the hand with equal probability."""
         instances = self.instance_space.sample(rng, count)
-        distance = rng.uniform(*HOOP_DISTANCE, size=count)
-        instances[:, HOOP.start] = distance * np.where(rng.random(count) < 0.5, -1.0, 1.0)
+        instances[:, HOOP.start] = SIDES_OF_GOAL.sample_x(rng, count)
         return instances
 
     def in_region(self, instances: Floats) -> Booleans:
         """Return which goals (b, I) are within the ranges of distances and heights of the hoop."""
-        hoop = instances[:, HOOP]
-        distance = np.abs(hoop[:, 0])
-        inside: Booleans = (
-            (distance >= HOOP_DISTANCE[0])
-            & (distance <= HOOP_DISTANCE[1])
-            & (hoop[:, 1] >= HOOP_HEIGHT[0])
-            & (hoop[:, 1] <= HOOP_HEIGHT[1])
-        )
-        return inside
+        return SIDES_OF_GOAL.contain(instances[:, HOOP])
 
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
-        """Return which goals (b, I) are in the two patches, on the left and on the right, with `fraction` of the hoops.
-
-        A patch is centred in distance and height, with the same scale in both.
-        """
-        hoop = instances[:, HOOP]
-        reach = 0.5 * np.sqrt(fraction)
-        shares = [
-            (value - low) / (high - low)
-            for value, (low, high) in ((np.abs(hoop[:, 0]), HOOP_DISTANCE), (hoop[:, 1], HOOP_HEIGHT))
-        ]
-        result: Booleans = np.all([np.abs(share - 0.5) < reach for share in shares], axis=0)
-        return result
+        """Return which goals (b, I) are in two patches, left and right, with `fraction` of the region's area."""
+        return SIDES_OF_GOAL.in_patches(instances[:, HOOP], fraction)
 
     def material(self, designs: Floats) -> Floats:
         """Return the length of the strip as a fraction of the largest, for designs (b, D) in their units."""

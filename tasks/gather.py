@@ -27,6 +27,7 @@ from codesign_bench.task import (
 )
 
 from ._planar import COLOURS, PLACE, VELOCITY, Canvas, Clock, PlanarSimulator, View
+from ._sides import TwoSides
 from ._strip import (
     MIDDLE,
     SEGMENTS,
@@ -95,6 +96,8 @@ DEEPEST = (MIDDLE + 0.5) * RISE
 """Largest distance of a point of a blade from the hand along y, m."""
 LOWEST_START = ROWS[0] - SCATTER - GRAIN_RADIUS - START_CLEARANCE - STRIP_HALF_WIDTH - DEEPEST
 """Smallest y at which a hand starts, m."""
+
+SIDES_OF_GOAL = TwoSides(GOAL_SIDE, GOAL_Y)
 
 DESIGN = Box.of(**{f"rise_{k + 1}": (-RISE, RISE, "m") for k in range(SEGMENTS)})
 CONTROL = Box.of(
@@ -199,23 +202,16 @@ class Gather(Task):
     def sample_instances(self, rng: np.random.Generator, count: int) -> Floats:
         """Return (count, I) random instances; the circle is on the left or right with equal probability."""
         instances = self.instance_space.sample(rng, count)
-        side = rng.uniform(*GOAL_SIDE, size=count)
-        instances[:, GOAL.start] = side * np.where(rng.random(count) < 0.5, -1.0, 1.0)
+        instances[:, GOAL.start] = SIDES_OF_GOAL.sample_x(rng, count)
         return instances
 
     def in_region(self, instances: Floats) -> Booleans:
         """Return which goals (b, I) are within the ranges of distances to the side and of y."""
-        inside: Booleans = np.all([(share >= 0.0) & (share <= 1.0) for share in _shares(instances)], axis=0)
-        return inside
+        return SIDES_OF_GOAL.contain(instances[:, GOAL])
 
     def in_cutout(self, instances: Floats, fraction: float) -> Booleans:
-        """Return which goals (b, I) are in the two patches, on the left and on the right, with `fraction` of the goals.
-
-        A patch is centred in distance to the side and in y, with the same scale in both.
-        """
-        reach = 0.5 * np.sqrt(fraction)
-        result: Booleans = np.all([np.abs(share - 0.5) < reach for share in _shares(instances)], axis=0)
-        return result
+        """Return which goals (b, I) are in two patches, left and right, with `fraction` of the region's area."""
+        return SIDES_OF_GOAL.in_patches(instances[:, GOAL], fraction)
 
     def material(self, designs: Floats) -> Floats:
         """Return the length of the blade along its outline as a fraction of the largest, for designs (b, D) in m."""
@@ -347,10 +343,3 @@ def grain_starts(instances: Floats) -> Floats:
     places = np.stack(np.meshgrid(COLUMNS, ROWS, indexing="ij"), axis=-1).reshape(-1, 2)
     starts: Floats = places + instances[:, SCATTERS].reshape(len(instances), NUM_GRAINS, 2)
     return starts
-
-
-def _shares(instances: Floats) -> list[Floats]:
-    """Return where goals (b, I) are in the ranges of distances to the side and of y, (b,) each, from 0 to 1."""
-    goal = instances[:, GOAL]
-    values = ((np.abs(goal[:, 0]), GOAL_SIDE), (goal[:, 1], GOAL_Y))
-    return [(value - low) / (high - low) for value, (low, high) in values]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from codesign_bench.config.settings import Settings, sourced
@@ -59,7 +59,9 @@ def ppo_settings(profile: str, task_name: str) -> Settings:
     return {**tuned(profile, PPO), **tuned_for(profile, task_name, PPO_BY_TASK)}
 
 
-def tuned_for(profile: str, task_name: str, table: Mapping[str, Mapping[str, Any]]) -> Settings:
-    """Return the settings of `table` for a task in one of our own profiles; none for any other profile."""
-    found = table.get(task_name, {}) if profile in LAYERS else {}
+def tuned_for(
+    profile: str, task_name: str, table: Mapping[str, Mapping[str, Any]], profiles: Collection[str] = tuple(LAYERS)
+) -> Settings:
+    """Return the settings of `table` for a task in those of our own profiles for which they were found; else none."""
+    found = table.get(task_name, {}) if profile in profiles else {}
     return sourced(found, f"tuned for {task_name} (ours)")

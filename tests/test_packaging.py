@@ -94,7 +94,7 @@ ACTION = re.compile(r"(- )?uses: [\w./-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+")
 
 
 PUBLISHING = {"pages.yml": ("permissions:", "pages: write", "id-token: write")}
-"""What the last job of a workflow may do besides reading, where it publishes the site."""
+"""What the last job of a workflow may do in addition to reading, where it publishes the site."""
 
 
 @pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.name)

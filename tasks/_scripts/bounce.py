@@ -129,7 +129,7 @@ def miss(strips: Floats, balls: Floats, hoops: Floats) -> Floats:
     velocity[..., 1] += impact
     rise = velocity[..., 1] ** 2 + 2.0 * GRAVITY * (height - hoops[..., None, 1])
     flight = (velocity[..., 1] + np.sqrt(np.maximum(rise, 0.0))) / GRAVITY
-    # A ball that stays below the hoop misses it by the height that it lacks, besides the distance along x.
+    # A ball that stays below the hoop misses it by the height that it lacks, plus the distance along x.
     lacking = np.maximum(-rise, 0.0) / (2.0 * GRAVITY)
     missed = np.abs(balls[..., 0] + velocity[..., 0] * flight - hoops[..., None, 0]) + lacking
     far: Floats = np.where(touched, missed, 10.0)

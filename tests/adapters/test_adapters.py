@@ -22,8 +22,8 @@ def test_a_missing_library_is_named_with_its_extra(name: str, extra: str, librar
         f"import sys; sys.modules[{library!r}] = None; import codesign_bench.adapters; codesign_bench.adapters.{name}"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    told = f"{name} needs {library}, which is not installed: pip install 'codesign-bench[{extra}]'"
-    assert done.stderr.splitlines()[-1] == f"codesign_bench.errors.UnavailableError: {told}"
+    message = f"{name} needs {library}, which is not installed: pip install 'codesign-bench[{extra}]'"
+    assert done.stderr.splitlines()[-1] == f"codesign_bench.errors.UnavailableError: {message}"
 
 
 def test_importing_the_package_imports_no_library() -> None:

@@ -44,8 +44,8 @@ def instance_with(hoop: tuple[float, float], height: float = 4.5) -> Floats:
 def design_with(**values: float) -> Floats:
     """Return the normalised design (1, 5) with these values, and else a level strip of the longest sides."""
     longest = bounce.SIDE_LENGTH[1]
-    told = {"tilt": 0.0, "bend": 0.0, "curl": 0.0, "left_length": longest, "right_length": longest, **values}
-    return TASK.design_space.to_unit(np.array([list(told.values())]))
+    given = {"tilt": 0.0, "bend": 0.0, "curl": 0.0, "left_length": longest, "right_length": longest, **values}
+    return TASK.design_space.to_unit(np.array([list(given.values())]))
 
 
 def play(instance: Floats, design: Floats, control: Floats = IDLE) -> Outcome:

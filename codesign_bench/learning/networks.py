@@ -16,16 +16,29 @@ from torch import Tensor, nn
 
 from codesign_bench.task import Box, ToolGraph
 
+MOMENTS_FEATURES = 16
+"""Features whose mean and variance are computed at a time (ours)."""
+
 
 def torch_generator(rng: np.random.Generator) -> torch.Generator:
     """Return a torch generator seeded by `rng`, only for initial weights; all else uses numpy generators."""
     return torch.Generator().manual_seed(int(rng.integers(2**62)))
 
 
+class _Unset(nn.Linear):
+    """A linear layer whose weights are yet to be set.
+
+    `nn.Linear` draws them from torch's global generator, and so shifts it for everybody else. `nn.utils.skip_init`
+    does not, but imports a library for symbolic mathematics on the way, which takes 40 MB.
+    """
+
+    def reset_parameters(self) -> None:
+        """Leave the weights as they are."""
+
+
 def linear(inputs: int, outputs: int, generator: torch.Generator, bias: bool = True) -> nn.Linear:
     """Return a linear layer with torch's usual initial weights, U(+-1/sqrt(inputs)), drawn from `generator`."""
-    # The usual constructor would draw weights from torch's global generator, and shift it for everybody else.
-    layer = nn.utils.skip_init(nn.Linear, inputs, outputs, bias=bias)
+    layer = _Unset(inputs, outputs, bias=bias)
     bound = inputs**-0.5
     with torch.no_grad():
         for parameter in layer.parameters():
@@ -225,6 +238,14 @@ def adjacency_matrix(graph: ToolGraph) -> Tensor:
     return matrix
 
 
+def _moments(values: Tensor) -> tuple[Tensor, Tensor]:
+    """Return mean and variance (F,) of values (B, F) in double precision."""
+    # A few features at a time, because a copy in double precision takes twice the memory of the batch.
+    parts = map(Tensor.double, values.split(MOMENTS_FEATURES, dim=1))
+    means, variances = zip(*((part.mean(0), part.var(0, unbiased=False)) for part in parts), strict=True)
+    return torch.cat(means), torch.cat(variances)
+
+
 class RunningNorm(nn.Module):
     """Normalises features by their running mean and standard deviation, clipped to +-5.
 
@@ -254,15 +275,15 @@ class RunningNorm(nn.Module):
         # Merging two sets: the variances within each, weighted by size, plus the spread between their means. Unlike a
         # sum of squares this does not cancel when the mean is large, and double precision keeps small batches from
         # being lost against a large count.
-        values = values.double()
         count = values.shape[0]
         total = self.count + count
-        difference = values.mean(0) - self.mean
+        mean, variance = _moments(values)
+        difference = mean - self.mean
         weight = count / total
         # The initial mean and variance come from bounds, not data: the first batch replaces them instead of mixing.
         old = torch.where(self.count > 0, self.variance * (self.count / total), torch.zeros_like(self.variance))
         cross = torch.where(self.count > 0, difference**2 * weight * (1 - weight), torch.zeros_like(self.variance))
-        self.variance.copy_(old + values.var(0, unbiased=False) * weight + cross)
+        self.variance.copy_(old + variance * weight + cross)
         self.mean.add_(difference * weight)
         self.count.copy_(total)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable
 
 import torch
@@ -10,13 +11,27 @@ from torch import nn
 from codesign_bench.learning.checkpointing import Optimizers
 
 
+class Adam(torch.optim.Adam):
+    """PyTorch's Adam without its guards against the compiler, which nothing here uses.
+
+    The guards import the compiler with the first optimizer of a process. That takes more than a second and 77 MB, as
+    much as eight PyBullet worlds.
+    """
+
+    add_param_group = inspect.unwrap(torch.optim.Adam.add_param_group)
+    state_dict = inspect.unwrap(torch.optim.Adam.state_dict)
+    load_state_dict = inspect.unwrap(torch.optim.Adam.load_state_dict)
+    zero_grad = inspect.unwrap(torch.optim.Adam.zero_grad)
+    step = torch.no_grad()(inspect.unwrap(torch.optim.Adam.step))
+
+
 def adam(parameters: Iterable[nn.Parameter], learning_rate: float) -> torch.optim.Adam:
     """Return Adam (Kingma and Ba 2015) for the trainable ones of `parameters`."""
     trainable = [p for p in parameters if p.requires_grad]
     try:
-        return torch.optim.Adam(trainable, lr=learning_rate, fused=True)
+        return Adam(trainable, lr=learning_rate, fused=True)
     except RuntimeError:  # PyTorch before 2.4 can fuse the steps on GPUs alone
-        return torch.optim.Adam(trainable, lr=learning_rate)
+        return Adam(trainable, lr=learning_rate)
 
 
 class Annealing:

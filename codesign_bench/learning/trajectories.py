@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 
 import numpy as np
 
@@ -102,13 +103,18 @@ class Trajectories:
 
 
 def joined(groups: Sequence[Trajectories]) -> Trajectories:
-    """Concatenate the slots of all groups into one batch."""
+    """Concatenate the slots of all groups into one batch, as long as its longest slot."""
     if len(groups) == 1:
         return groups[0]
-    length = max(group.valid.shape[1] for group in groups)
+    length = max(int(group.valid.sum(axis=1).max()) for group in groups)
 
-    def together(parts: Iterable[np.ndarray]) -> np.ndarray:
-        return np.concatenate([_padded(part, length) for part in parts])
+    def together(arrays: Iterable[np.ndarray]) -> np.ndarray:
+        # Filled in place, because padding every part first would hold one more copy of the batch.
+        parts = [array[:, :length] for array in arrays]
+        result = np.zeros((sum(map(len, parts)), length, *parts[0].shape[2:]), dtype=parts[0].dtype)
+        for start, part in zip(accumulate(map(len, parts), initial=0), parts, strict=False):
+            result[start : start + len(part), : part.shape[1]] = part
+        return result
 
     first = vars(groups[0])
     arrays = {
@@ -121,10 +127,3 @@ def joined(groups: Sequence[Trajectories]) -> Trajectories:
 
 def _is_array(value: object) -> bool:
     return isinstance(value, np.ndarray)
-
-
-def _padded(values: np.ndarray, length: int) -> np.ndarray:
-    """Return (S, T, ...) `values` padded with zeros to `length` steps."""
-    missing = [(0, 0)] * values.ndim
-    missing[1] = (0, length - values.shape[1])
-    return np.pad(values, missing)

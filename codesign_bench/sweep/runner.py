@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import pandas as pd
 from rich.console import Console
 
 from codesign_bench.cell.cell import Cell, ResolvedCell
@@ -34,6 +33,8 @@ EXIT_ALL_DONE, EXIT_SOME_FAILED = 0, 1
 MAX_BROKEN_POOLS = 10
 """How many times in a row the worker processes may die before any cell ends."""
 LOCK_POLL_SECONDS = 1.0
+UNREADABLE = (OSError, ValueError, LookupError)
+"""What reading a curve raises if it is missing, cut off or damaged."""
 
 
 @dataclass(frozen=True)
@@ -245,10 +246,14 @@ def _holders(queue: Sequence[Job]) -> str:
 def _tell(outcome: Outcome, display: ProgressDisplay, trouble: Trouble) -> None:
     display.ended(outcome.cell)
     if isinstance(display.console, JsonLines):
-        last = _last_values(outcome.cell, display.out)
-        display.console.event(
-            "cell", {"cell": outcome.cell.name, "status": outcome.status, "message": _one_line(outcome.message), **last}
-        )
+        event: dict[str, object] = {
+            "cell": outcome.cell.name,
+            "status": outcome.status,
+            "message": _one_line(outcome.message),
+        }
+        with suppress(*UNREADABLE):
+            event |= _last_values(outcome.cell, display.out)
+        display.console.event("cell", event)
     if outcome.status == FAILED:
         trouble.failed[outcome.cell] = outcome.message
         display.say(f"failed  {outcome.cell.name}  {_one_line(outcome.message)}")
@@ -261,22 +266,25 @@ def _tell(outcome: Outcome, display: ProgressDisplay, trouble: Trouble) -> None:
         )
 
 
-def _last_values(cell: Cell, out: Path) -> dict[str, Any]:
-    """Return the last row of a cell's curve, for programs; nothing if it cannot be read."""
-    try:
-        last = pd.read_csv(cell.folder(out) / CURVE_FILE).iloc[-1]
-        return {name: last[name] for name in CURVE_COLUMNS}
-    except (OSError, ValueError, LookupError, TypeError):
-        return {}
+def _last_values(cell: Cell, out: Path) -> dict[str, float]:
+    """Return the last row of a cell's curve.
+
+    Raises:
+        one of `UNREADABLE`.
+    """
+    # Not with pandas: a cell may run in this process, and would take 33 MB more.
+    with (cell.folder(out) / CURVE_FILE).open(newline="", encoding="utf-8") as file:
+        last = list(csv.DictReader(file))[-1]
+    return {name: float(last[name] or "nan") for name in CURVE_COLUMNS}
 
 
 def _last_row(cell: Cell, out: Path, budget: int) -> str:
     try:
-        last = pd.read_csv(cell.folder(out) / CURVE_FILE).iloc[-1]
-        outcome = f"return {last['return_mean']:.2f}, success {last['success_rate']:.2f}"
-        return f"{outcome}, {last['env_steps']:,.0f} steps{over(last['env_steps'], budget)}, {last['wall_s']:.0f} s"
-    except (OSError, ValueError, LookupError, TypeError) as error:
+        last = _last_values(cell, out)
+    except UNREADABLE as error:
         return f"its curve cannot be read ({_one_line(str(error))})"
+    outcome = f"return {last['return_mean']:.2f}, success {last['success_rate']:.2f}"
+    return f"{outcome}, {last['env_steps']:,.0f} steps{over(last['env_steps'], budget)}, {last['wall_s']:.0f} s"
 
 
 def over(env_steps: float, budget: int) -> str:

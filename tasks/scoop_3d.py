@@ -333,7 +333,7 @@ class Scoop3D(Task):
 
     run_settings: ClassVar[ByProfile] = {"laptop": {"steps": 500_000, "evaluations": 10}}
     outcome = Quantity("balls held above the line", "balls")
-    max_slots = MAX_SLOTS
+    max_slots = 18
     # Balls that collide at up to 2.8 m/s overlap for a step of 1/120 s, also right after pouring; tools start clear of
     # all bodies. A million random steps saw overlaps of 0.56 radii and, right after pouring, 0.32 radii.
     soundness = Soundness(

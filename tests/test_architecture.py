@@ -300,3 +300,14 @@ def test_listing_and_helping_import_nothing_heavy(heavy: str) -> None:
     line = f"{call}print({heavy!r} in sys.modules)"
     done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "False"
+
+
+def test_training_a_cell_imports_nothing_that_it_does_not_need(tmp_path: Path) -> None:
+    heavy = ("torch._dynamo", "sympy", "pandas", "matplotlib", "cma")  # 33 to 90 MB each, for every cell of a sweep
+    out = tmp_path / "runs"
+    command = f"run --method gnn_ppo --task push --profile quick --jobs 1 --seeds 1 --set steps=400 --out {out}"
+    call = f"import sys; from codesign_bench.cli import main; main({command!r}.split()); "
+    line = f"{call}print('found', *[name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
+    assert (out / "push/gnn_ppo/default/seed-00/evaluation.csv").exists()
+    assert done.stdout.splitlines()[-1] == "found"

@@ -16,6 +16,7 @@ import torch
 
 from codesign_bench.learning.networks import (
     MLP,
+    MOMENTS_FEATURES,
     GraphConvolution,
     GraphNetwork,
     IndexMLP,
@@ -160,8 +161,9 @@ def test_weights_follow_their_generator_alone() -> None:
 
 def test_running_norm_follows_mean_and_variance_over_batches() -> None:
     rng = np.random.default_rng(0)
-    norm = RunningNorm([-1.0, 0.0, 10.0], [1.0, 5.0, 20.0])
-    batches = [rng.normal(loc, 1.0 + loc, size=(count, 3)) for loc, count in ((0.0, 5), (3.0, 1), (40.0, 300))]
+    features = 2 * MOMENTS_FEATURES + 1
+    norm = RunningNorm([-1.0] * features, [1.0] * features)
+    batches = [rng.normal(loc, 1.0 + loc, size=(count, features)) for loc, count in ((0.0, 5), (3.0, 1), (40.0, 300))]
     for batch in batches:
         norm.update(torch.from_numpy(batch))
     values = np.concatenate(batches)

@@ -1,7 +1,8 @@
-"""Which parameters Adam trains, and how step sizes fall."""
+"""Which parameters Adam trains, that its steps are those of PyTorch, and how step sizes fall."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import torch
 
@@ -13,6 +14,23 @@ def test_parameters_that_are_not_learned_are_left_out() -> None:
     (group,) = adam([learned, fixed], 0.1).param_groups
     assert group["params"] == [learned]
     assert group["lr"] == 0.1
+
+
+def test_steps_and_state_are_those_of_pytorch() -> None:
+    ours, theirs = (torch.nn.Parameter(torch.linspace(-1.0, 1.0, 7)) for _ in range(2))
+    optimizers = [adam([ours], 0.1), torch.optim.Adam([theirs], lr=0.1, fused=True)]
+    for step in range(5):
+        for parameter, optimizer in zip((ours, theirs), optimizers, strict=True):
+            optimizer.zero_grad()
+            (parameter**3).sum().backward()
+            optimizer.step()
+        if step == 2:  # a new optimizer goes on from the state of this one
+            state = optimizers[0].state_dict()
+            optimizers[0] = adam([ours], 0.5)
+            optimizers[0].load_state_dict(state)
+    np.testing.assert_array_equal(ours.detach().numpy(), theirs.detach().numpy())
+    assert optimizers[0].param_groups[0]["lr"] == 0.1
+    assert ours.requires_grad
 
 
 @pytest.mark.parametrize(("done", "factor"), [(0.0, 1.0), (0.5, 0.6), (1.0, 0.2)])

@@ -1,7 +1,8 @@
 """Copy finished cells into results that are shipped: `python results/ship_cells.py RUNS [SHIPPED]`.
 
-What only resuming needs stays behind. Of policies, every seed of the paper's method on the default variant and seed 0
-of everything else go along; `--all-policies` takes every one. A cell that is there already is left as it is.
+What only resuming needs stays behind. Of policies, every seed of the paper's method on the default variant and the
+lowest seed of everything else go along; `--all-policies` takes every one. A cell that is there already is left as it
+is.
 """
 
 from __future__ import annotations
@@ -9,9 +10,10 @@ from __future__ import annotations
 import argparse
 import shutil
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
-from codesign_bench.cell.variant import DEFAULT
+from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import reported_cells
 from codesign_bench.storage.layout import CURVE_FILE, EVALUATION_FILE, METRICS_FILE, POLICY_FILE, open_folder
@@ -24,9 +26,16 @@ RECORDS = (CURVE_FILE, METRICS_FILE, EVALUATION_FILE, CELL_FILE)
 """What is shipped of every cell; the file that says it is finished comes last."""
 
 
-def ships_policy(cell: CellRecord) -> bool:
-    """Return whether a cell's policy is shipped."""
-    return cell.seed == 0 or (cell.method == OURS and cell.variant == DEFAULT)
+def ships_policy(cell: CellRecord, cells: Iterable[CellRecord]) -> bool:
+    """Return whether the policy of a cell is shipped, one of `cells`."""
+    if cell.method == OURS and cell.variant == DEFAULT:
+        return True
+    alike = [other.seed for other in cells if _kind(other) == _kind(cell)]
+    return cell.seed == min(alike)
+
+
+def _kind(cell: CellRecord) -> tuple[str, str, Variant]:
+    return cell.task, cell.method, cell.variant
 
 
 def ship(runs: Path, shipped: Path, all_policies: bool = False) -> list[Path]:
@@ -37,13 +46,14 @@ def ship(runs: Path, shipped: Path, all_policies: bool = False) -> list[Path]:
     """
     copied = []
     cells = [cell for cell in reported_cells(runs) if cell.is_done]
+    records = [cell.record for cell in cells]
     open_folder(shipped)
     for cell in cells:
         target = shipped / cell.folder.relative_to(runs)
         if (target / CELL_FILE).exists():
             continue
         target.mkdir(parents=True, exist_ok=True)
-        policy = (POLICY_FILE,) if all_policies or ships_policy(cell.record) else ()
+        policy = (POLICY_FILE,) if all_policies or ships_policy(cell.record, records) else ()
         for name in (*policy, *RECORDS):
             shutil.copyfile(cell.folder / name, target / name)
         copied.append(target)

@@ -19,6 +19,7 @@ SCRIPT = Path(__file__).resolve().parents[2] / "results" / "ship_cells.py"
 FIRST = Path("push/gnn_ppo/default/seed-00")
 SECOND = Path("push/gnn_ppo/default/seed-01")
 BASELINE = Path("push/cma_es/default/seed-01")
+LOWEST = Path("push/cma_es/default/seed-00")
 RECORDS = {"cell.json", "curve.csv", "evaluation.csv", "metrics.csv"}
 
 pytestmark = pytest.mark.skipif(not SCRIPT.exists(), reason="a source distribution leaves the results out")
@@ -26,13 +27,14 @@ pytestmark = pytest.mark.skipif(not SCRIPT.exists(), reason="a source distributi
 
 @pytest.fixture
 def runs(tmp_path: Path) -> Path:
-    """A results folder with three finished cells, as a run leaves them."""
+    """A results folder with four finished cells, as a run leaves them."""
     folder = tmp_path / "runs"
-    for cell in (FIRST, SECOND, BASELINE):
+    for cell in (FIRST, SECOND, BASELINE, LOWEST):
         shutil.copytree(VERSION_0_1_0 / cell, folder / cell)
         for leftover in (CHECKPOINT_FILE, LOG_FILE, "cell.lock"):
             (folder / cell / leftover).write_bytes(b"left over")
-    shutil.copyfile(folder / FIRST / "policy.safetensors", folder / BASELINE / "policy.safetensors")
+    for cell in (BASELINE, LOWEST):
+        shutil.copyfile(folder / FIRST / "policy.safetensors", folder / cell / "policy.safetensors")
     return folder
 
 
@@ -50,6 +52,7 @@ def test_records_go_along_and_the_policies_that_are_shipped(runs: Path, tmp_path
     shipped = tmp_path / "shipped"
     assert ship(runs, shipped).returncode == 0
     assert files(shipped / FIRST) == files(shipped / SECOND) == {*RECORDS, "policy.safetensors"}
+    assert files(shipped / LOWEST) == {*RECORDS, "policy.safetensors"}
     assert files(shipped / BASELINE) == RECORDS
     assert cb.load_results(shipped)["seed"].nunique() == 2
     cb.load_policy(shipped / SECOND)

@@ -27,6 +27,7 @@ from codesign_bench.text_tables import markdown
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "results" / "reference"
 LONGER = ROOT / "results" / "longer"
+ALL_METHODS = ROOT / "results" / "all_methods"
 SUBMISSIONS = ROOT / "results" / "submissions"
 PAGES = {
     ROOT / "docs" / "results.md": REFERENCE,
@@ -34,6 +35,7 @@ PAGES = {
     ROOT / "docs" / "leaderboard.md": SUBMISSIONS,
     REFERENCE / "README.md": REFERENCE,
     LONGER / "README.md": LONGER,
+    ALL_METHODS / "README.md": ALL_METHODS,
 }
 """Every page and the results, or the folder of archives, that its tables show."""
 PAPERS_METHOD = "gnn_ppo"

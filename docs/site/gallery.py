@@ -2,7 +2,7 @@
 
 A task without a shipped policy is played by its script.
 
-    python docs/site/gallery.py [--results results/reference] [TASK ...]
+    python docs/site/gallery.py [--results results/all_methods] [TASK ...]
 
 An animation shows the final policy of the first seed on the first two evaluation instances, whatever comes of them,
 side by side. `gallery.json` beside the animations records what each shows. Policies of an earlier version of a task
@@ -128,7 +128,7 @@ def main() -> int:
     """Draw the cells of the named tasks, or of all; return the exit code."""
     parser = argparse.ArgumentParser(description="Draw the gallery from shipped policies.")
     parser.add_argument("tasks", nargs="*", metavar="TASK", help="default: all")
-    parser.add_argument("--results", type=Path, default=ROOT / "results" / "reference")
+    parser.add_argument("--results", type=Path, default=ROOT / "results" / "all_methods")
     options = parser.parse_args()
     path = GALLERY / RECORD
     entries = json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
@@ -147,6 +147,9 @@ def main() -> int:
     for task in options.tasks or built_in("tasks"):
         if not any(of_task == task for of_task, method in known if method != SCRIPT):
             keep(known, *scripted(task))
+        elif known.pop((task, SCRIPT), None):
+            (GALLERY / f"{task}_{SCRIPT}.gif").unlink()
+    write(known)
     return 0
 
 
@@ -157,6 +160,11 @@ def keep(known: dict[tuple[str, str], dict[str, Any]], entry: dict[str, Any], co
     known[task, method] = entry
     evaluated_so = f", as evaluated: {entry['as_evaluated']}" if entry["cell"] else ""
     print(f"{task} {method}: {len(content) // 1000} kB, solved {entry['solved']}{evaluated_so}")
+    write(known)
+
+
+def write(known: dict[tuple[str, str], dict[str, Any]]) -> None:
+    """Write the record of all animations."""
     records = [known[key] for key in sorted(known)]
     (GALLERY / RECORD).write_text(json.dumps(records, indent=1) + "\n", encoding="utf-8")
 

@@ -26,6 +26,10 @@ from gallery import GALLERY, RECORD, SCRIPT
 
 RESULTS = ROOT / "results"
 REFERENCE = RESULTS / "reference"
+EXPLORED = RESULTS / "all_methods"
+"""What the explorer shows: policies on the present version of every task."""
+EXPLORER = "explore.html"
+"""Where the explorer lies on the site."""
 INSERT = re.compile(r"^<!-- insert: (\w+) -->$", re.MULTILINE)
 """Where a hand-written page takes a generated part."""
 CODE = re.compile(r"^<!-- code: (\S+) (\w+) -->$", re.MULTILINE)
@@ -469,5 +473,16 @@ def _has_text(path: Path) -> bool:
     return bool(ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))))
 
 
-INSERTS: dict[str, Callable[[], str]] = {"tasks": tasks_in_motion, "success": success}
+def explorer() -> str:
+    """Return the explorer on shipped results, in a frame of its page and by itself."""
+    return (
+        "```{raw} html\n"
+        f'<iframe class="explorer" src="{EXPLORER}" title="The explorer: drag the goal, see the tool" loading="lazy">'
+        "</iframe>\n"
+        f'<p><a href="{EXPLORER}">The explorer on a page of its own</a></p>\n'
+        "```"
+    )
+
+
+INSERTS: dict[str, Callable[[], str]] = {"tasks": tasks_in_motion, "success": success, "explorer": explorer}
 """Name in `<!-- insert: NAME -->` -> the part."""

@@ -15,8 +15,13 @@ from pathlib import Path
 import generated
 from assemble import ROOT, Site, pages, place_of
 from check_links import faults
+from codesign_bench.explorer.gather import Choice
+from codesign_bench.explorer.page import write_explorer
 
 SOURCE, OUT = ROOT / "build" / "site-source", ROOT / "build" / "site"
+EXPLORED_CELLS = Choice(methods=("gnn_ppo", "shared_arch", "stackelberg_ppo", "cma_rl"))
+"""As many methods as fit a page; the best two that make a tool per goal, and the best that makes one, come with the
+paper's."""
 
 
 def gather(out: Path) -> None:
@@ -54,6 +59,7 @@ def main() -> int:
     shutil.rmtree(OUT, ignore_errors=True)
     if code := sphinx("html", OUT):
         return code
+    write_explorer(generated.EXPLORED, OUT / generated.EXPLORER, print, EXPLORED_CELLS)
     found = faults(OUT)
     print("\n".join(found) or f"the site is in {OUT.relative_to(ROOT)}: open {OUT.relative_to(ROOT)}/index.html")
     return 1 if found else 0

@@ -164,7 +164,9 @@ def test_code_of_a_file_is_shown_by_name() -> None:
 
 @pytest.mark.reference
 def test_every_shipped_policy_is_in_the_gallery_and_did_there_what_its_evaluation_says() -> None:
-    shipped = {path.parts[-5:-3] for path in ROOT.glob("results/reference/*/*/default/seed-*/policy.safetensors")}
+    policies = "*/*/default/seed-*/policy.safetensors"
+    folders = [ROOT / "results" / name for name in ("reference", "all_methods")]
+    shipped = {path.parts[-5:-3] for folder in folders for path in folder.glob(policies)}
     entries = [entry for entry in generated.entries() if entry["cell"]]
     assert {(entry["task"], entry["method"]) for entry in entries} == shipped
     assert [entry for entry in entries if not entry["as_evaluated"]] == []
@@ -195,6 +197,12 @@ def test_actions_are_pinned_by_commit(workflow: Path) -> None:
     used = re.findall(r"uses: (\S+)", workflow.read_text(encoding="utf-8"))
     assert used
     assert [action for action in used if not re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", action)] == []
+
+
+def test_the_page_of_the_explorer_has_it_in_a_frame() -> None:
+    page = generated.completed("docs/explorer.md", (ROOT / "docs" / "explorer.md").read_text(encoding="utf-8"))
+    assert page.count(f'src="{generated.EXPLORER}"') == 1
+    assert generated.EXPLORED.is_dir()
 
 
 def test_a_page_of_a_task_moves() -> None:

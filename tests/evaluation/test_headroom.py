@@ -66,9 +66,14 @@ def toy_cell(out: Path, length: float = 0.3, speed: float = 0.2) -> Path:
     return store_played_cell(out, "toy_reach", "toy_search", {"vector": np.array([length, speed])})
 
 
+def read(path: Path) -> pd.DataFrame:
+    """Return a table with every digit; pandas before 3.1 drops the last ones unless asked."""
+    return pd.read_csv(path, float_precision="round_trip")
+
+
 def stored(path: Path) -> pd.DataFrame:
     """Return a stored table, the instances in front."""
-    return pd.read_csv(path).set_index("instance")
+    return read(path).set_index("instance")
 
 
 def test_the_best_stick_touches_every_goal_within_reach() -> None:
@@ -139,7 +144,7 @@ def test_every_instance_has_its_row_and_none_is_worse_than_the_designer(tmp_path
     folder, lines = toy_cell(tmp_path), list[str]()
     path = measure_cell(folder, tmp_path, SMALL, lines.append)
     assert path == tmp_path / "headroom" / "toy_reach-toy_search-seed-00.csv"
-    table, evaluation = stored(path), pd.read_csv(folder / "evaluation.csv")
+    table, evaluation = stored(path), read(folder / "evaluation.csv")
     assert table["designer_return"].tolist() == pytest.approx(evaluation["return"].tolist())
     assert table["designer_success"].tolist() == evaluation["success"].tolist()
     assert table["other_return"].tolist() == table["designer_return"].tolist(), "it has one tool"

@@ -18,7 +18,7 @@ def test_parameters_that_are_not_learned_are_left_out() -> None:
 
 def test_steps_and_state_are_those_of_pytorch() -> None:
     ours, theirs = (torch.nn.Parameter(torch.linspace(-1.0, 1.0, 7)) for _ in range(2))
-    optimizers = [adam([ours], 0.1), torch.optim.Adam([theirs], lr=0.1, fused=True)]
+    optimizers = [adam([ours], 0.1), torch.optim.Adam([theirs], lr=0.1, fused=adam([ours], 0.1).defaults["fused"])]
     for step in range(5):
         for parameter, optimizer in zip((ours, theirs), optimizers, strict=True):
             optimizer.zero_grad()

@@ -33,7 +33,7 @@ EXIT_ALL_DONE, EXIT_SOME_FAILED = 0, 1
 MAX_BROKEN_POOLS = 10
 """How many times in a row the worker processes may die before any cell ends."""
 LOCK_POLL_SECONDS = 1.0
-UNREADABLE = (OSError, ValueError, LookupError)
+UNREADABLE = (OSError, ValueError, LookupError, csv.Error)
 """What reading a curve raises if it is missing, cut off or damaged."""
 
 
@@ -262,7 +262,7 @@ def _tell(outcome: Outcome, display: ProgressDisplay, trouble: Trouble) -> None:
         display.say(f"interrupted  {outcome.cell.name}  {_one_line(outcome.message)}")
     else:
         display.say(
-            f"done    {outcome.cell.name}  {_last_row(outcome.cell, display.out, display.budgets[outcome.cell])}"
+            f"done    {outcome.cell.name}  {last_row(outcome.cell, display.out, display.budgets[outcome.cell])}"
         )
 
 
@@ -274,11 +274,12 @@ def _last_values(cell: Cell, out: Path) -> dict[str, float]:
     """
     # Not with pandas: a cell may run in this process, and would take 33 MB more.
     with (cell.folder(out) / CURVE_FILE).open(newline="", encoding="utf-8") as file:
-        last = list(csv.DictReader(file))[-1]
+        last = list(csv.DictReader(file, restval="cut off"))[-1]
     return {name: float(last[name] or "nan") for name in CURVE_COLUMNS}
 
 
-def _last_row(cell: Cell, out: Path, budget: int) -> str:
+def last_row(cell: Cell, out: Path, budget: int) -> str:
+    """Return in words what a cell has reached at the end of its curve, or why that cannot be read."""
     try:
         last = _last_values(cell, out)
     except UNREADABLE as error:

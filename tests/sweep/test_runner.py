@@ -17,7 +17,7 @@ from codesign_bench.errors import UserError
 from codesign_bench.storage.layout import CHECKPOINT_FILE, LOG_FILE, MARKER_FILE, PROGRESS_FILE, open_folder
 from codesign_bench.storage.locks import LOCK_FILE
 from codesign_bench.storage.records import CellRecord
-from codesign_bench.sweep.runner import split_cores
+from codesign_bench.sweep.runner import last_row, split_cores
 
 pytestmark = pytest.mark.usefixtures("toy")
 
@@ -51,6 +51,30 @@ def test_a_finished_cell_whose_curve_has_changed_is_told_and_left_alone(tmp_path
         assert code == 1
         assert "curve.csv: its checksum does not match; delete its folder to run it again" in " ".join(text.split())
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+HEADER = "env_steps,wall_s,return_mean,return_se,success_rate,episode_length\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (
+            HEADER + "0,0,0,0,0,9\n210,12.4,1.254,,0.5,8\n",
+            "return 1.25, success 0.50, 210 steps (5% over the budget), 12 s",
+        ),
+        (
+            HEADER + "0,0,0,0,0,9\n210,12.4,1.2",
+            "its curve cannot be read (could not convert string to float: 'cut off')",
+        ),
+        (HEADER, "its curve cannot be read (list index out of range)"),
+        ("return_mean\n1.0\n", "its curve cannot be read ('env_steps')"),
+    ],
+)
+def test_the_end_of_a_curve_is_told_in_words(content: str, told: str, tmp_path: Path) -> None:
+    CELL.folder(tmp_path).mkdir(parents=True)
+    (CELL.folder(tmp_path) / "curve.csv").write_text(content)
+    assert last_row(CELL, tmp_path, budget=200) == told
 
 
 def test_a_copy_of_another_cell_is_never_taken_for_the_cell(tmp_path: Path) -> None:

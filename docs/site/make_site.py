@@ -1,4 +1,5 @@
-"""Build the site: gather its sources, let Sphinx build them with warnings as errors, check every internal link.
+"""Build the site: gather its sources, let Sphinx build them with warnings as errors, add the explorer, check every
+internal link.
 
 python docs/site/make_site.py [--links]    into build/site; with --links, also ask for every external link
 """

@@ -24,7 +24,7 @@ def test_steps_and_state_are_those_of_pytorch() -> None:
             optimizer.zero_grad()
             (parameter**3).sum().backward()
             optimizer.step()
-        if step == 2:  # a new optimizer goes on from the state of this one
+        if step == 2:  # a new optimizer resumes from the state of this one
             state = optimizers[0].state_dict()
             optimizers[0] = adam([ours], 0.5)
             optimizers[0].load_state_dict(state)

@@ -57,7 +57,7 @@ HEADER = "env_steps,wall_s,return_mean,return_se,success_rate,episode_length\n"
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "message"),
     [
         (
             HEADER + "0,0,0,0,0,9\n210,12.4,1.254,,0.5,8\n",
@@ -71,10 +71,10 @@ HEADER = "env_steps,wall_s,return_mean,return_se,success_rate,episode_length\n"
         ("return_mean\n1.0\n", "its curve cannot be read ('env_steps')"),
     ],
 )
-def test_the_end_of_a_curve_is_told_in_words(content: str, told: str, tmp_path: Path) -> None:
+def test_the_end_of_a_curve_is_put_in_words(content: str, message: str, tmp_path: Path) -> None:
     CELL.folder(tmp_path).mkdir(parents=True)
     (CELL.folder(tmp_path) / "curve.csv").write_text(content)
-    assert last_row(CELL, tmp_path, budget=200) == told
+    assert last_row(CELL, tmp_path, budget=200) == message
 
 
 def test_a_copy_of_another_cell_is_never_taken_for_the_cell(tmp_path: Path) -> None:

@@ -3,22 +3,33 @@
 An idle PyBullet world takes 28 MB, of which 20 MB are buffers of zeros. On Linux, a page of zeros that is private to
 the process can be dropped: whoever reads it later gets zeros again, whoever writes it gets a new page. So no number
 changes, and no call becomes slower but the first ones that use such a page. Elsewhere nothing is done.
+
+Only pages that are in memory are dropped. A page that was never written reads as zeros, too, but dropping it gains
+nothing, and Python may take it for its own objects between the look and the drop, which would then lose them.
+
+Memory is read through `/proc/self/mem`, not at its address: a region that was listed may be gone a moment later, for
+instance the memory that held the list, and reading an address that is gone would end the process.
 """
 
 from __future__ import annotations
 
 import ctypes
 import mmap
+import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 MAPS = Path("/proc/self/maps")
+MEMORY = Path("/proc/self/mem")
 LEAST_PAGES = 16
 """Shorter runs of zeros stay: each costs a call, and they are not the buffers that are meant (ours)."""
+PAGES_AT_ONCE = 64
+"""Pages that are copied to be looked at (ours)."""
 WORD_BYTES = 8
 Region = tuple[int, int]
 """First address, and the one after the last."""
@@ -64,14 +75,71 @@ def without(region: Region, others: list[Region]) -> Iterator[Region]:
 
 
 def give_back_zeros(region: Region) -> None:
-    """Give back the runs of at least `LEAST_PAGES` pages of zeros in a region, which begins and ends with a page."""
-    # The library is called without giving up Python's lock, so no thread of Python writes into a page in between.
-    madvise = ctypes.PyDLL(None).madvise
-    madvise.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int)
+    """Give back the runs of at least `LEAST_PAGES` pages of zeros in a region, which begins and ends with a page.
+
+    Where a part of the region is gone, the pages around it may stay.
+    """
+    copy, _ = _scratch()
     start, end = region
-    memory = np.frombuffer(memoryview((ctypes.c_char * (end - start)).from_address(start)), dtype=np.uint64)
-    zero = np.flatnonzero(~memory.reshape(-1, mmap.PAGESIZE // WORD_BYTES).any(axis=1))
-    for run in np.split(zero, np.flatnonzero(np.diff(zero) > 1) + 1):
+    with suppress(OSError), MEMORY.open("rb", buffering=0) as memory:  # some systems let no process read its memory
+        for first in range(start, end, len(copy)):
+            with suppress(OSError):  # nothing is there any more
+                resident = _resident(first, min(len(copy), end - first))
+                size = os.preadv(memory.fileno(), [memoryview(copy)[: end - first]], first)
+                content = np.frombuffer(memoryview(copy)[:size], dtype=np.uint64).reshape(
+                    -1, mmap.PAGESIZE // WORD_BYTES
+                )
+                for run in _runs(resident[: len(content)] & ~content.any(axis=1)):
+                    _drop_zeros(memory.fileno(), first + run.start * mmap.PAGESIZE, len(run) * mmap.PAGESIZE)
+
+
+def _resident(address: int, size: int) -> np.ndarray:
+    """Return which of the pages are in memory. Reading a page puts it there. Raises `OSError` if one is gone."""
+    pages = np.zeros(size // mmap.PAGESIZE, dtype=np.uint8)
+    if _library().mincore(address, size, pages.ctypes.data):
+        raise OSError("no such memory")
+    return (pages & 1).astype(bool)
+
+
+def _runs(wanted: np.ndarray) -> Iterator[range]:
+    """Yield the numbers of every run of at least `LEAST_PAGES` wanted pages."""
+    numbers = np.flatnonzero(wanted)
+    for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
         if len(run) >= LEAST_PAGES:
-            # A refusal is no error: the pages then stay where they are.
-            madvise(start + int(run[0]) * mmap.PAGESIZE, len(run) * mmap.PAGESIZE, mmap.MADV_DONTNEED)
+            yield range(int(run[0]), int(run[-1]) + 1)
+
+
+def _drop_zeros(memory: int, address: int, size: int) -> None:
+    """Drop pages that still hold nothing but zeros.
+
+    They are looked at again, because other threads ran while NumPy looked at the copy. PyDLL calls the library without
+    giving up Python's lock, so none of Python's runs in between.
+    """
+    library = _library()
+    copy, zeros = _scratch()
+    if library.pread(memory, copy, size, address) == size and library.memcmp(copy, zeros, size) == 0:
+        # A refusal is no error: the pages then stay where they are.
+        library.madvise(address, size, mmap.MADV_DONTNEED)
+
+
+@cache
+def _scratch() -> tuple[ctypes.Array[ctypes.c_char], ctypes.Array[ctypes.c_char]]:
+    """Return room for a copy, and as many zeros.
+
+    They are kept, and not taken from the heap: a world's buffers would come to lie where a copy has been, in memory
+    that was there before.
+    """
+    room = ctypes.c_char * (PAGES_AT_ONCE * mmap.PAGESIZE)
+    copy, zeros = (room.from_buffer(mmap.mmap(-1, ctypes.sizeof(room))) for _ in range(2))
+    return copy, zeros
+
+
+@cache
+def _library() -> ctypes.PyDLL:
+    library = ctypes.PyDLL(None)
+    library.pread.argtypes = (ctypes.c_int, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_long)
+    library.pread.restype = ctypes.c_ssize_t
+    library.memcmp.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)
+    library.mincore.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
+    library.madvise.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int)
+    return library

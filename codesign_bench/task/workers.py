@@ -5,6 +5,7 @@ The caller cuts the work into parts. Their number must not depend on that of the
 
 from __future__ import annotations
 
+import faulthandler
 import multiprocessing
 import os
 import signal
@@ -52,6 +53,7 @@ def _prepare(make: Callable[[], Any], parent: int) -> None:
     global _resource  # one per worker process
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; the parent handles it
     end_with(parent)
+    faulthandler.enable()  # the pool tells that a worker crashed, but not where
     _resource = make()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import mmap
 import sys
 from importlib import import_module
@@ -77,6 +78,33 @@ def test_short_runs_and_what_was_there_before_stay() -> None:
     with zero_pages.zeros_given_back():
         pass
     assert resident_kilobytes() > before - 128 * PAGE / 1024
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="nothing is given back on other systems")
+def test_memory_that_is_gone_by_then_ends_no_process() -> None:
+    library, pages = ctypes.CDLL(None), 4096
+    library.mmap.restype = ctypes.c_void_p
+    private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
+    start = library.mmap(None, ctypes.c_size_t(pages * PAGE), mmap.PROT_READ | mmap.PROT_WRITE, private, -1, 0)
+    ctypes.memset(start, 0, pages * PAGE)  # touches every page, so that all are resident
+    assert library.munmap(ctypes.c_void_p(start + 2000 * PAGE), ctypes.c_size_t(100 * PAGE)) == 0
+    before = resident_kilobytes()
+    zero_pages.give_back_zeros((start, start + pages * PAGE))
+    assert before - resident_kilobytes() > 0.9 * pages * PAGE / 1024
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="nothing is given back on other systems")
+def test_pages_that_were_never_written_are_not_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Python may be about to use them: a page that it fills between the look and the drop would be lost.
+    dropped: list[tuple[int, int]] = []
+    monkeypatch.setattr(zero_pages, "_drop_zeros", lambda memory, address, size: dropped.append((address, size)))
+    block = mmap.mmap(-1, 256 * PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    array = np.frombuffer(block, dtype=np.uint8)
+    array[64 * PAGE : 128 * PAGE] = 0
+    start = array.ctypes.data
+    zero_pages.give_back_zeros((start, start + 256 * PAGE))
+    sizes = [size for address, size in dropped if start <= address < start + 256 * PAGE]
+    assert sum(sizes) == 64 * PAGE
 
 
 def test_other_systems_do_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

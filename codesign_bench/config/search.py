@@ -24,6 +24,8 @@ NOT_SEARCHED = "not_searched"
 DIGITS = 4
 """Significant digits of drawn numbers: enough for any setting, and short enough to type."""
 
+BELOW_ONE = math.nextafter(1.0, 0.0)
+
 Condition: TypeAlias = tuple[str, Any]
 """Name of another setting and the value that it must have."""
 
@@ -39,6 +41,23 @@ class Range(ABC):
     def at(self, share: float) -> Any:
         """Return the value below which the share, in [0, 1), of all draws lies."""
 
+    @abstractmethod
+    def place(self, value: Any) -> float:
+        """Return the share at which a value of this range lies; of an integer or a choice, the middle of its shares."""
+
+    def near(self, value: Any, share: float, spread: float) -> Any:
+        """Return the value at `share` of a window around `value` that holds the share `spread` of all draws.
+
+        The window stays within the range. None stands for a default that depends on the task: the window is the range.
+
+        Raises:
+            ValueError: the value is not one of the choices.
+        """
+        if value is None:
+            return self.at(share)
+        first = min(max(self.place(value) - spread / 2, 0.0), 1.0 - spread)
+        return self.at(min(first + share * spread, BELOW_ONE))
+
 
 @dataclass(frozen=True)
 class Uniform(Range):
@@ -50,6 +69,10 @@ class Uniform(Range):
     def at(self, share: float) -> float:
         """Return a number, rounded to four digits."""
         return _rounded(self.low + share * (self.high - self.low))
+
+    def place(self, value: float) -> float:
+        """Return the share of the way from `low` to `high`."""
+        return (value - self.low) / (self.high - self.low)
 
     def __str__(self) -> str:
         return f"{self.low:g} to {self.high:g}"
@@ -65,6 +88,10 @@ class LogUniform(Range):
     def at(self, share: float) -> float:
         """Return a number, rounded to four digits."""
         return _rounded(self.low * (self.high / self.low) ** share)
+
+    def place(self, value: float) -> float:
+        """Return the share of the way from `low` to `high` on a logarithmic scale."""
+        return math.log(value / self.low) / math.log(self.high / self.low)
 
     def __str__(self) -> str:
         return f"{self.low:g} to {self.high:g}, log"
@@ -84,6 +111,12 @@ class Integer(Range):
         value = self.low * ((self.high + 1) / self.low) ** share if self.log else self.low + share * count
         return min(math.floor(value), self.high)  # rounding could reach high + 1
 
+    def place(self, value: int) -> float:
+        """Return the share in the middle of those that give the integer."""
+        if self.log:
+            return math.log((value + 0.5) / self.low) / math.log((self.high + 1) / self.low)
+        return (value + 0.5 - self.low) / (self.high + 1 - self.low)
+
     def __str__(self) -> str:
         return f"integers {self.low} to {self.high}{', log' if self.log else ''}"
 
@@ -97,6 +130,14 @@ class Choice(Range):
     def at(self, share: float) -> Any:
         """Return one of the values."""
         return self.values[int(share * len(self.values))]
+
+    def place(self, value: Any) -> float:
+        """Return the share in the middle of those that give the value.
+
+        Raises:
+            ValueError: the value is not among the choices.
+        """
+        return (self.values.index(value) + 0.5) / len(self.values)
 
     def __str__(self) -> str:
         return f"one of {', '.join(map(str, self.values))}"
@@ -113,10 +154,24 @@ def ranges(config: Any) -> dict[str, Range]:
     return {name: found for name, found in declared.items() if name not in left_out and _holds(found.where, config)}
 
 
-def draw(searched: Mapping[str, Range], count: int, seed: int) -> list[dict[str, Any]]:
-    """Return `count` random settings: name -> value for every range. The first ones are the same for any count."""
+def draw(
+    searched: Mapping[str, Range], count: int, seed: int, around: Mapping[str, Any] | None = None, spread: float = 1.0
+) -> list[dict[str, Any]]:
+    """Return `count` random settings: name -> value for every range. The first ones are the same for any count.
+
+    Args:
+        searched: name -> range.
+        count: number of settings.
+        seed: of the draws; every name has a stream of its own.
+        around: name -> value around which to draw; None: draw from the whole range.
+        spread: share of a range that is drawn from around a value (`Range.near`).
+    """
     shares = {name: generator(seed, f"search of {name}").random(count) for name in searched}
-    return [{name: found.at(float(shares[name][index])) for name, found in searched.items()} for index in range(count)]
+
+    def value(name: str, share: float) -> Any:
+        return searched[name].at(share) if around is None else searched[name].near(around[name], share, spread)
+
+    return [{name: value(name, float(shares[name][index])) for name in searched} for index in range(count)]
 
 
 def _holds(condition: Condition | None, config: Any) -> bool:

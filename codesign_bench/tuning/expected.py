@@ -96,7 +96,7 @@ def print_plan(console: Console, tuning: Tuning, profile: str, steps: int | None
     ]
     log = printer(console)
     print_table(console, ("task", "rung", "settings", "steps of a cell", "steps of a method"), rows)
-    each = sum(tuning.steps(budgets[task][-1]) for task in tuning.tasks)
+    each = sum(tuning.steps(budgets[task]) for task in tuning.tasks)
     cells = sum(tuning.sizes) * len(tuning.seeds) * len(tuning.tasks) * len(tuning.methods)
     log(
         f"the same for {', '.join(tuning.methods)}: {each:,} steps each, {each * len(tuning.methods):,} in all, "
@@ -129,7 +129,7 @@ def expected(
         budgets = budgets_of(tuning, task, profile, steps)
         count, taken = done.get((task, method), (0, 0))
         cells = sum(tuning.sizes) * len(tuning.seeds) - count
-        left = max(tuning.steps(budgets[-1]) - taken, 0)
+        left = max(tuning.steps(budgets) - taken, 0)
         parts.append(Part(task, method, max(cells, 0), left, known.get(kind_of(cell))))
     return Expected(parts, max(1, min(jobs or available_cores(), available_cores())))
 

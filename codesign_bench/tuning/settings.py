@@ -17,14 +17,14 @@ from codesign_bench.study.tuning import Tuning
 
 @dataclass(frozen=True)
 class Setting:
-    """One random setting of all searched hyperparameters of a method on a task."""
+    """Values of all searched hyperparameters of a method on a task."""
 
     task: str
     method: str
     number: int
-    """Its place among the settings that were drawn, from 0."""
+    """Its place among the settings of the search, from 0."""
     values: Mapping[str, Any]
-    """Hyperparameter -> value."""
+    """Hyperparameter -> value; empty: the profile's settings."""
 
     @property
     def overrides(self) -> tuple[str, ...]:
@@ -40,20 +40,26 @@ class Setting:
 def settings_of(tuning: Tuning, task: str, method: str, profile: str) -> list[Setting]:
     """Return the settings with which the search of a method on a task starts.
 
-    The shipped values are not among them: they are the result of earlier tuning, of which some methods got more.
+    The profile's values are among them only in a search around them (`Tuning.spread`): they are the result of earlier
+    tuning, of which some methods got more.
 
     Raises:
         UserError: the method declares no range.
     """
-    searched = ranges(resolve(load_method(method), task, profile).method)
+    config = resolve(load_method(method), task, profile).method
+    searched = ranges(config)
     if not searched:
         raise UserError(f"'{method}' declares no range to search; see docs/tuning.md")
-    drawn = draw(searched, tuning.settings, tuning.draw)
+    if tuning.spread is None:
+        drawn = draw(searched, tuning.settings, tuning.draw)
+    else:
+        around = {name: getattr(config, name) for name in searched}
+        drawn = [{}, *draw(searched, tuning.settings - 1, tuning.draw, around, tuning.spread)]
     return [Setting(task, method, number, values) for number, values in enumerate(drawn)]
 
 
 def budgets_of(tuning: Tuning, task: str, profile: str, steps: int | None) -> list[int]:
-    """Return the budget of a cell in each rung on a task; the last one is that of the profile, or `steps`.
+    """Return the budget of a cell in each rung on a task, for the profile's budget or the budget `steps`.
 
     Raises:
         UserError: an unknown name.

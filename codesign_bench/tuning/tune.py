@@ -20,7 +20,7 @@ from codesign_bench.sweep.runner import EXIT_ALL_DONE, run_sweep
 from codesign_bench.task import usable_tasks
 from codesign_bench.tuning.expected import expected, print_plan
 from codesign_bench.tuning.results import TABLE_FILE, WINNERS_FILE, check_tables, spent, write_table, write_winners
-from codesign_bench.tuning.scores import Score, score, survivors
+from codesign_bench.tuning.scores import Score, pooled, score, survivors
 from codesign_bench.tuning.settings import budgets_of, cells_in_turn, settings_of
 
 
@@ -117,7 +117,7 @@ def tune(
         cells = [setting.cells(tuning, rung, profile, budgets[setting.task][rung]) for setting in alive]
         code = max(code, sweep(resolve_cells(cells_in_turn(cells))))
         found = [score(setting, rung, part, out) for setting, part in zip(alive, cells, strict=True)]
-        winners = survivors(found, following)
+        winners = (pooled if tuning.pooled else survivors)(found, following)
         alive = [winner.setting for winner in winners]
         scores += found
         kept += winners
@@ -138,7 +138,7 @@ def conclude(log: Log, out: Path, profile: str, chosen: list[Score], scores: lis
     for winner in chosen:
         setting = winner.setting
         log(f"{setting.task} {setting.method}: setting {setting.number}, return {winner.validation_return:.2f}")
-        log(f"  --set {' '.join(setting.overrides)}")
+        log(f"  --set {' '.join(setting.overrides)}" if setting.values else "  the profile's settings")
     log("train with them on seeds that tuning did not use, for example:")
     log(
         f"codesign-bench run --method {' '.join(dict.fromkeys(found.setting.method for found in chosen))} "

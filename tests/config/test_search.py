@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -52,6 +53,39 @@ class WithoutRate(Config):
 def test_a_share_of_the_draws_is_below_the_value(searched: Range, share: float, value: Any) -> None:
     assert searched.at(share) == value
     assert type(searched.at(share)) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("searched", "value", "place"),
+    [
+        (Uniform(-2.0, 0.0), -1.5, 0.25),
+        (LogUniform(1e-4, 1e-2), 1e-3, 0.5),
+        (Integer(1, 4), 3, 0.625),
+        (Integer(2, 7, log=True), 3, math.log(3.5 / 2) / math.log(4)),
+        (Choice(("a", "b")), "b", 0.75),
+    ],
+)
+def test_a_value_has_its_place_in_the_range(searched: Range, value: Any, place: float) -> None:
+    assert searched.place(value) == pytest.approx(place)
+    assert searched.at(place) == value
+
+
+def test_a_window_around_a_value_holds_a_share_of_the_draws_and_stays_in_the_range() -> None:
+    numbers = Uniform(0.0, 10.0)
+    assert [numbers.near(4.0, share, 0.2) for share in (0.0, 0.5)] == [3.0, 4.0]
+    assert [numbers.near(0.5, share, 0.2) for share in (0.0, 0.5)] == [0.0, 1.0]
+    assert [numbers.near(12.0, share, 0.2) for share in (0.0, NEARLY_ONE)] == [8.0, 10.0]
+    assert numbers.near(None, 0.7, 0.2) == numbers.at(0.7)
+    assert Choice(("a", "b", "c", "d")).near("c", NEARLY_ONE, 1.0) == "d"
+
+
+@pytest.mark.parametrize("name", method_names())
+def test_the_ranges_of_a_method_include_what_profiles_set(name: str) -> None:
+    for task in task_names():
+        config = resolve(load_method(name), task, "laptop").method
+        for key, searched in ranges(config).items():
+            value = getattr(config, key)
+            assert value is None or 0.0 <= searched.place(value) <= 1.0, (task, key, value)
 
 
 def test_numbers_have_four_digits() -> None:

@@ -24,8 +24,13 @@ def test_one_setting_in_three_goes_on_to_three_times_the_budget() -> None:
 
 
 def test_steps_are_those_of_all_cells_of_a_method_on_a_task() -> None:
-    assert tuning().steps(900) == 2 * (18 * 100 + 6 * 300 + 2 * 900)
-    assert tuning(seeds=(4,)).steps(900) == 5400
+    assert tuning().steps([100, 300, 900]) == 2 * (18 * 100 + 6 * 300 + 2 * 900)
+    assert tuning(seeds=(4,)).steps([100, 300, 900]) == 5400
+
+
+def test_a_search_may_play_a_share_of_the_budget() -> None:
+    assert tuning(share=0.5).budgets(900) == [50, 150, 450]
+    assert tuning(share=0.25, rungs=1, settings=4).budgets(1_000_000) == [250_000]
 
 
 @pytest.mark.parametrize(
@@ -34,6 +39,8 @@ def test_steps_are_those_of_all_cells_of_a_method_on_a_task() -> None:
         ({"rungs": 0}, "at least 1 rung"),
         ({"eta": 1}, "at least 1 rung and eta 2, not 3 and 1"),
         ({"settings": 8}, "8 settings are too few for 3 rungs with eta 3"),
+        ({"share": 0.0}, "above 0 and at most 1, not 0.0 and None"),
+        ({"spread": 1.5}, "above 0 and at most 1, not 1.0 and 1.5"),
         ({"seeds": ()}, r"different ones from 0 to 9, not \(\)"),
         ({"seeds": (0, 0)}, "different ones from 0 to 9"),
         ({"seeds": (FIRST_REPORTED_SEED,)}, r"from 0 to 9, not \(100,\)"),

@@ -9,7 +9,7 @@ from builders import rising, store_cell
 from codesign_bench.cell.cell import Cell
 from codesign_bench.cell.variant import Variant
 from codesign_bench.storage.records import FAILED
-from codesign_bench.tuning.scores import Score, best, score, survivors
+from codesign_bench.tuning.scores import Score, best, pooled, score, survivors
 from codesign_bench.tuning.settings import Setting
 
 SETTING = Setting("push", "gnn_ppo", 3, {"epochs": 2})
@@ -17,9 +17,9 @@ VARIANT = Variant.of(rung=0, setting=3)
 CELLS = [Cell("push", "gnn_ppo", seed, VARIANT, steps=500) for seed in (0, 1)]
 
 
-def of(number: int, value: float, method: str = "gnn_ppo") -> Score:
+def of(number: int, value: float, method: str = "gnn_ppo", task: str = "push") -> Score:
     """Return a score of the setting with a number."""
-    return Score(Setting("push", method, number, {}), 0, 500, 1000, value)
+    return Score(Setting(task, method, number, {}), 0, 500, 1000, value)
 
 
 def test_a_score_is_the_mean_over_seeds_of_the_last_return(tmp_path: Path) -> None:
@@ -57,3 +57,21 @@ def test_as_many_go_on_for_every_method_on_every_task_but_failed_ones() -> None:
     ]
     going_on = [(found.setting.method, found.setting.number) for found in survivors(scores, 2)]
     assert going_on == [("gnn_ppo", 1), ("gnn_ppo", 2), ("cma_es", 0), ("cma_es", 2)]
+
+
+def test_a_pooled_choice_is_the_best_mean_rank_over_tasks_whatever_their_scales() -> None:
+    returns = {"push": (0.1, 0.2, 0.3), "scoop": (500.0, 900.0, 100.0), "bounce": (-3.0, -1.0, -2.0)}
+    scores = [of(number, value, task=task) for task, values in returns.items() for number, value in enumerate(values)]
+    # Mean ranks: (3 + 2 + 3) / 3, (2 + 1 + 1) / 3 and (1 + 3 + 2) / 3.
+    assert [(found.setting.task, found.setting.number) for found in pooled(scores, 1)] == [(t, 1) for t in returns]
+    assert {found.setting.number for found in pooled(scores, 2)} == {1, 2}
+
+
+def test_a_pooled_choice_prefers_the_first_of_equals_and_no_setting_that_failed_somewhere() -> None:
+    scores = [
+        *(of(number, value) for number, value in enumerate((1.0, 2.0, 9.0))),
+        *(of(number, value, task="scoop") for number, value in enumerate((2.0, 1.0, nan))),
+        *(of(number, value, "cma_es") for number, value in enumerate((0.0, 0.0, 0.0))),
+    ]
+    going_on = [(found.setting.method, found.setting.task, found.setting.number) for found in pooled(scores, 1)]
+    assert going_on == [("gnn_ppo", "push", 0), ("gnn_ppo", "scoop", 0), ("cma_es", "push", 0)]

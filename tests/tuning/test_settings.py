@@ -38,6 +38,24 @@ def test_a_setting_that_two_methods_share_is_drawn_alike() -> None:
     assert drawn[0] == [setting.values for setting in settings_of(study, "scoop", "gnn_ppo", "laptop")]
 
 
+def test_a_search_around_the_profile_begins_with_its_settings_and_stays_near_them(tuning: Tuning) -> None:
+    study = Tuning(methods=("gnn_ppo",), tasks=("push",), settings=30, spread=0.2)
+    shipped, *others = settings_of(study, "push", "gnn_ppo", "laptop")
+    assert (shipped.number, shipped.overrides) == (0, ())
+    assert [setting.number for setting in others] == list(range(1, 30))
+    rates = [setting.values["policy_learning_rate"] for setting in others]
+    # A fifth of the logarithms from 3e-5 to 3e-3 is a factor of 10^0.4; the profile's rate is 7e-4.
+    assert 7e-4 * 10**-0.2 <= min(rates) < 7e-4 < max(rates) <= 7e-4 * 10**0.2
+
+
+def test_a_change_is_the_same_on_every_task() -> None:
+    study = Tuning(methods=("gnn_ppo",), tasks=("push", "scoop"), settings=9, spread=0.5)
+    push, scoop = (settings_of(study, task, "gnn_ppo", "laptop")[1].values for task in study.tasks)
+    assert push["clip_ratio"] == scoop["clip_ratio"]
+    shift = {name: values["control_log_std"] for name, values in (("push", push), ("scoop", scoop))}
+    assert shift["push"] - -0.5 == pytest.approx(shift["scoop"] - -1.0, abs=1e-3)
+
+
 def test_its_cells_have_its_values_and_are_judged_on_validation_instances(tuning: Tuning) -> None:
     setting = Setting("toy_reach", "toy_aim", 7, {"length": 0.25})
     cells = setting.cells(tuning, 1, "quick", 300)

@@ -9,7 +9,12 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+import code_pages
+import code_text
 import generated
+import member_pages
+import motion_pages
+import study_pages
 from assemble import ROOT, Site, pages, place_of
 from check_links import faults
 from codesign_bench.method import load_method
@@ -91,20 +96,20 @@ def test_a_notebook_gets_the_address_of_the_published_project(site: Site, monkey
 
 
 def test_the_table_of_methods_has_every_method_and_what_is_measured() -> None:
-    page = generated.methods()
+    page = member_pages.methods()
     rows = {row.split("[")[1].split("]")[0]: row for row in page.splitlines() if row.startswith("| [")}
     for name in built_in("methods"):
         assert f"docs/methods/{name}.md" in page
         assert ("one per goal" if load_method(name).tool_per_goal else "one for all goals") in page
     assert set(built_in("methods")) <= set(rows)
-    for row in generated.final_results():
+    for row in member_pages.final_results():
         if row["task"] == "average":
             assert f"{float(row['normalized_score']):.2f} [" in page
 
 
 @pytest.mark.parametrize("name", built_in("methods"))
 def test_every_method_says_what_learns_and_from_where(name: str) -> None:
-    summary, source = generated.told_by_module(name)
+    summary, source = member_pages.told_by_module(name)
     assert len(summary) > 20
     assert source
 
@@ -112,7 +117,7 @@ def test_every_method_says_what_learns_and_from_where(name: str) -> None:
 @pytest.mark.parametrize("name", presented("tasks"))
 def test_the_list_of_tasks_says_what_each_asks_for(name: str) -> None:
     task = load_task(name)
-    (row,) = [line for line in generated.tasks().splitlines() if line.startswith(f"| [{name}]")]
+    (row,) = [line for line in member_pages.tasks().splitlines() if line.startswith(f"| [{name}]")]
     numbers = (task.design_space.size, task.control_space.size, task.goal_size, task.horizon)
     assert row.endswith("| " + " | ".join(str(number) for number in numbers) + " |")
 
@@ -120,23 +125,23 @@ def test_the_list_of_tasks_says_what_each_asks_for(name: str) -> None:
 @pytest.mark.reference
 def test_a_page_of_a_study_has_its_verdicts_and_figures() -> None:
     study = load_study("corl2023")
-    (folder,) = generated.shipped(study)
+    (folder,) = study_pages.shipped(study)
     claims = json.loads((folder / "claims" / "claims.json").read_text(encoding="utf-8"))["claims"]
-    page = generated.study_page(study)
+    page = study_pages.study_page(study)
     assert [claim["name"] for claim in claims if claim["sentence"] not in page] == []
     assert "results/reference/figures/final_results.png" in page
     supported = sum(claim["verdict"] == "supported" for claim in claims)
-    assert f"{len(claims)} claims: {supported} supported" in generated.studies()
+    assert f"{len(claims)} claims: {supported} supported" in study_pages.studies()
 
 
 def test_a_study_without_results_says_so() -> None:
-    assert generated.shipped(load_study("necessity")) or "no claim is judged" in generated.study_page(
+    assert study_pages.shipped(load_study("necessity")) or "no claim is judged" in study_pages.study_page(
         load_study("necessity")
     )
 
 
 def test_the_api_reference_has_every_package_and_public_name() -> None:
-    found = dict(generated.api())
+    found = dict(code_pages.api())
     everything = "\n".join(found.values())
     files = [path for path in (ROOT / "codesign_bench").rglob("*.py") if not path.stem.startswith("_")]
     modules = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in files]
@@ -151,15 +156,15 @@ def test_public_names_are_those_that_a_module_defines_and_explains(tmp_path: Pat
         "def f(): ...\ndef _g(): ...\nclass K: ...\n",
         encoding="utf-8",
     )
-    assert generated.public(path) == ["A", "C", "f", "K"]
+    assert code_text.public(path) == ["A", "C", "f", "K"]
 
 
 def test_code_of_a_file_is_shown_by_name() -> None:
     path = ROOT / "docs" / "examples" / "practice.py"
-    assert generated.definition(path, "Practice").startswith("class Practice(Axis):")
-    assert generated.definition(path, "STUDY").startswith("STUDY = Study(")
+    assert code_text.definition(path, "Practice").startswith("class Practice(Axis):")
+    assert code_text.definition(path, "STUDY").startswith("STUDY = Study(")
     with pytest.raises(ValueError, match="defines no Nothing"):
-        generated.definition(path, "Nothing")
+        code_text.definition(path, "Nothing")
 
 
 @pytest.mark.reference
@@ -167,23 +172,25 @@ def test_every_shipped_policy_is_in_the_gallery_and_did_there_what_its_evaluatio
     policies = "*/*/default/seed-*/policy.safetensors"
     folders = [ROOT / "results" / name for name in ("reference", "all_methods")]
     shipped = {path.parts[-5:-3] for folder in folders for path in folder.glob(policies)}
-    entries = [entry for entry in generated.entries() if entry["cell"]]
+    entries = [entry for entry in motion_pages.entries() if entry["cell"]]
     assert {(entry["task"], entry["method"]) for entry in entries} == shipped
     assert [entry for entry in entries if not entry["as_evaluated"]] == []
     assert [entry["cell"] for entry in entries if not (ROOT / "results" / entry["cell"]).is_dir()] == []
 
 
 def test_every_task_is_in_motion_if_only_by_its_script() -> None:
-    assert generated.tasks_in_motion().count(":::{figure}") == len(built_in("tasks"))
-    assert {entry["task"] for entry in generated.entries()} == set(built_in("tasks"))
+    assert motion_pages.tasks_in_motion().count(":::{figure}") == len(built_in("tasks"))
+    assert {entry["task"] for entry in motion_pages.entries()} == set(built_in("tasks"))
     assert all(
-        entry["task_version"] == load_task(entry["task"]).version for entry in generated.entries() if not entry["cell"]
+        entry["task_version"] == load_task(entry["task"]).version
+        for entry in motion_pages.entries()
+        if not entry["cell"]
     )
 
 
 def test_pictures_of_the_gallery_move_and_are_small() -> None:
     sizes = {}
-    for entry in generated.entries():
+    for entry in motion_pages.entries():
         path = GALLERY / f"{entry['task']}_{entry['method']}.gif"
         with Image.open(path) as picture:
             assert getattr(picture, "n_frames", 1) > 1, path

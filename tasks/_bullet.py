@@ -14,7 +14,6 @@ from itertools import combinations
 from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
-from PIL import Image, ImageDraw
 
 from codesign_bench.task import (
     OURS,
@@ -34,7 +33,8 @@ from codesign_bench.task import (
 from codesign_bench.task.robot import ArmReport, DeployedSimulator
 
 from ._carriers import CARRIER_SCENE, LEVEL, Carrier, Gantry, HeldTool, ToolShape, pybullet, run
-from ._scene import COLOURS, PICTURE_PIXELS, Clock
+from ._marks import PICTURE_SHAPE, Camera, MarkList, Marks
+from ._scene import COLOURS, Clock
 from ._zero_pages import zeros_given_back
 
 GRAVITY: Annotated[float, Given("m/s^2", "the Earth's")] = 9.81
@@ -57,8 +57,6 @@ Triple: TypeAlias = tuple[float, float, float]
 """Along x, y and z, or of width, length and height."""
 PLACE, ROTATION, VELOCITY, SPIN = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)
 """Columns of `BulletSimulator.bodies`: position (m), quaternion, velocity (m/s), angular velocity (rad/s)."""
-PICTURE_SHAPE = (3 * PICTURE_PIXELS // 4, PICTURE_PIXELS)
-"""Height and width of a picture in pixels."""
 
 _idle_worlds: list[int] = []
 """Connections of deleted simulators, reused by the next one: a new connection costs tens of ms and 9 MB."""
@@ -80,20 +78,6 @@ def box_parts(boxes: Boxes) -> tuple[BoxPart, ...]:
     """Return the parts of the first tool in `boxes`."""
     entries = zip(boxes.half_extents[0].tolist(), boxes.centres[0].tolist(), boxes.rotations[0].tolist(), strict=True)
     return tuple(BoxPart(tuple(half), tuple(centre), tuple(rotation)) for half, centre, rotation in entries)
-
-
-@dataclass(frozen=True)
-class Camera:
-    """The viewpoint of pictures of a scene."""
-
-    eye: tuple[float, float, float]
-    target: tuple[float, float, float]
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    field_of_view: float = 45.0
-    """Vertical, degrees."""
-    near: float = 0.1
-    """Nearer objects are not drawn, e.g. to leave out a roof in a picture from above."""
-    far: float = 10.0
 
 
 def rotations_about(axis: int, angles: Floats) -> Floats:
@@ -418,59 +402,11 @@ class BulletSimulator(DeployedSimulator):
         return tool
 
 
-class Marks:
-    """Lines and dots on a picture of a scene, at positions in the scene."""
-
-    def __init__(self, pixels: Frame, to_clip: Floats) -> None:
-        self._image = Image.fromarray(pixels)
-        self._draw = ImageDraw.Draw(self._image)
-        self._to_clip = to_clip
-
-    def line(self, points: Floats, colour: str, width: int = 2) -> None:
-        """Draw a line through `points` (n, 3), m; `width` in pixels."""
-        self._draw.line([tuple(pixel) for pixel in self._at(points).tolist()], fill=colour, width=width)
-
-    def dot(self, point: Floats, colour: str, radius: int = 3) -> None:
-        """Draw a disc at `point` (3,), m; `radius` in pixels."""
-        ((x, y),) = self._at(point[None, :3]).tolist()
-        self._draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=colour)
-
-    def frame(self) -> Frame:
-        """Return the picture, (height, width, 3), in RGB."""
-        return np.array(self._image)
-
-    def _at(self, points: Floats) -> Floats:
-        # Homogeneous coordinates times the transposed matrices of OpenGL: after division by the last coordinate, the
-        # visible part is [-1, 1], with y upwards, whereas rows of pixels count downwards.
-        clip = np.pad(points, ((0, 0), (0, 1)), constant_values=1.0) @ self._to_clip
-        shares = 0.5 + 0.5 * clip[:, :2] / clip[:, 3:]
-        place: Floats = np.array(self._image.size) * np.stack([shares[:, 0], 1.0 - shares[:, 1]], axis=1)
-        return place
-
-
 def _new_world() -> int:
     """Return a new connection, without the zeros that are two thirds of its memory."""
     with zeros_given_back():
         world: int = pybullet.connect(pybullet.DIRECT)
     return world
-
-
-class MarkList(Marks):
-    """Keeps what is drawn on it as items instead of pixels."""
-
-    def __init__(self) -> None:  # no picture, so not the parent's
-        self.items: list[Item] = []
-
-    def line(self, points: Floats, colour: str, width: int = 2) -> None:
-        """Keep a line."""
-        first = points[0, :3]
-        corners = tuple(tuple(corner) for corner in (points[:, :3] - first).tolist())
-        self.items.append(Item((Shape("line", colour, corners, (float(width),)),), tuple(first.tolist())))
-
-    def dot(self, point: Floats, colour: str, radius: int = 3) -> None:
-        """Keep a disc."""
-        shape = Shape("dot", colour, ((0.0, 0.0, 0.0),), (float(radius),))
-        self.items.append(Item((shape,), tuple(point[:3].tolist())))
 
 
 def _hand_on(worlds: list[int | None]) -> None:

@@ -35,8 +35,6 @@ from ._bullet import (
     VELOCITY,
     Boxes,
     BulletSimulator,
-    Camera,
-    Marks,
     Triple,
     box_parts,
     rotations_about,
@@ -51,6 +49,7 @@ from ._deployed import (
     arm_carrier,
     gripper_handle,
 )
+from ._marks import Camera, Marks
 from ._scene import COLOURS, Clock, nearest_clear_shift
 
 PAPER = "paper, table of fetch cube"

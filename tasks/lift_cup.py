@@ -36,8 +36,6 @@ from ._bullet import (
     VELOCITY,
     Boxes,
     BulletSimulator,
-    Camera,
-    Marks,
     Triple,
     box_parts,
     rotation_matrices,
@@ -53,6 +51,7 @@ from ._deployed import (
     arm_carrier,
     gripper_handle,
 )
+from ._marks import Camera, Marks
 from ._scene import COLOURS, Clock
 
 PAPER = "paper, table of lift cup"

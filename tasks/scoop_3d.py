@@ -37,14 +37,13 @@ from ._bullet import (
     VELOCITY,
     Boxes,
     BulletSimulator,
-    Camera,
-    Marks,
     Triple,
     box_parts,
     rotation_matrices,
     rotations_about,
 )
 from ._carriers import MISSING, pybullet
+from ._marks import Camera, Marks
 from ._scene import COLOURS, Clock
 
 PAPER = "paper, table of 3D scoop"

@@ -9,10 +9,12 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from codesign_bench.claims.evidence import load_evidence
@@ -20,6 +22,7 @@ from codesign_bench.claims.verify import Row, by_rule, contradicted, judge
 from codesign_bench.figures.source import Request, curves_with_references
 from codesign_bench.registry import in_order, load_module
 from codesign_bench.sharing.leaderboard import leaderboard
+from codesign_bench.stats import final_values, welch_across
 from codesign_bench.storage.reference_points import FILE, POINTS, load_reference_points
 from codesign_bench.study import DEFAULT_STUDY, load_study
 from codesign_bench.text_tables import markdown
@@ -97,6 +100,42 @@ def _both(task: str, scripted: pd.Series[float], learned: pd.Series[float]) -> s
     return f"{task.replace('_', ' ')} {scripted[task]:.2f} to {learned[task]:.2f}"
 
 
+def _response(results: Path) -> str:
+    """Return what a separate credit, and then the response term of `stackelberg_ppo`, add to success on each task."""
+    last = final_values(_curves(results), "success_rate")
+
+    def of(task: str, method: str, variant: str) -> np.ndarray:
+        rows = last[(last["task"] == task) & (last["method"] == method) & (last["variant"] == variant)]
+        return rows["success_rate"].to_numpy()
+
+    steps = ((PAPERS_METHOD, "default"), (PAPERS_METHOD, "credit-separate"), ("stackelberg_ppo", "default"))
+    found = {task: [of(task, *step) for step in steps] for task in in_order("tasks", set(last["task"]))}
+    found = {task: samples for task, samples in found.items() if all(len(sample) for sample in samples)}
+    lines = [
+        [
+            task.replace("_", " "),
+            *(f"{sample.mean():.2f} ({', '.join(f'{value:.2f}' for value in sample)})" for sample in samples),
+            *(_difference([pair]) for pair in _added(samples)),
+        ]
+        for task, samples in found.items()
+    ]
+    credits, responses = zip(*map(_added, found.values()), strict=True)
+    lines.append([f"mean of {len(found)} tasks", "", "", "", _difference(credits), _difference(responses)])
+    header = ["task", "joint credit", "separate credit", "separate credit and response", "credit adds", "response adds"]
+    return markdown(header, lines)
+
+
+def _added(samples: Sequence[np.ndarray]) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    """Return the pairs (with, without) of neighbours in a row of samples, each of which adds one thing to the last."""
+    return tuple((later, earlier) for earlier, later in pairwise(samples))
+
+
+def _difference(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
+    """Return the mean difference within pairs, with Welch's interval and p-value."""
+    found = welch_across(pairs)
+    return f"{found.value:+.2f} [{found.low:.2f}, {found.high:.2f}], p {found.p:.2f}"
+
+
 @lru_cache
 def _judged(results: Path) -> list[Row]:
     claims = load_study(DEFAULT_STUDY).claims()
@@ -108,6 +147,7 @@ MAKERS: dict[str, Callable[[Path], str]] = {
     "success": _success,
     "reference_points": _reference_points,
     "script": _script,
+    "response": _response,
     "leaderboard": lambda folder: leaderboard(folder, "../results/submissions"),
     "claims": lambda results: by_rule(_judged(results)),
     "contradicted": lambda results: contradicted(_judged(results)),

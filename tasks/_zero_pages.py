@@ -127,10 +127,11 @@ def _scratch() -> tuple[ctypes.Array[ctypes.c_char], ctypes.Array[ctypes.c_char]
     """Return room for a copy, and as many zeros.
 
     They are kept, and not taken from the heap: a world's buffers would come to lie where a copy has been, in memory
-    that was there before.
+    that was there before. They are private, so that a forked process does not write into its parent's.
     """
     room = ctypes.c_char * (PAGES_AT_ONCE * mmap.PAGESIZE)
-    copy, zeros = (room.from_buffer(mmap.mmap(-1, ctypes.sizeof(room))) for _ in range(2))
+    private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
+    copy, zeros = (room.from_buffer(mmap.mmap(-1, ctypes.sizeof(room), flags=private)) for _ in range(2))
     return copy, zeros
 
 

@@ -107,6 +107,15 @@ def test_pages_that_were_never_written_are_not_dropped(monkeypatch: pytest.Monke
     assert sum(sizes) == 64 * PAGE
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="nothing is given back on other systems")
+def test_a_forked_process_has_room_of_its_own_for_copies() -> None:
+    # Of shared room, one process would judge its pages by what another has just copied.
+    private = zero_pages.private_regions(zero_pages.MAPS.read_text())
+    for room in zero_pages._scratch():
+        start = ctypes.addressof(room)
+        assert any(first <= start and start + len(room) <= end for first, end in private)
+
+
 def test_other_systems_do_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
     monkeypatch.setattr(sys, "platform", "darwin")

@@ -5,24 +5,10 @@ The question is open, so there are no claims: what is seen here becomes a claim 
 
 from __future__ import annotations
 
+from codesign_bench.registry import built_in
 from codesign_bench.study import FIRST_REPORTED_SEED, Experiment, Grid, Study, Tuning
 
-METHODS = (
-    "gnn_ppo",
-    "shared_arch",
-    "cma_rl",
-    "hwasp_minimal",
-    "cma_es",
-    "contextual_cma",
-    "pt_me",
-    "critic_design",
-    "stackelberg_ppo",
-    "coadaptation",
-    "bo_rl",
-    "fixed_tool",
-    "random_tool",
-)
-TASKS = ("push", "catch_balls", "scoop", "fetch_cube", "lift_cup", "scoop_3d", "bounce", "gather")
+METHODS, TASKS = built_in("methods"), built_in("tasks")
 SEEDS = tuple(range(FIRST_REPORTED_SEED, FIRST_REPORTED_SEED + 3))
 
 STUDY = Study(

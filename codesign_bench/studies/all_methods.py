@@ -22,5 +22,15 @@ STUDY = Study(
     },
     # Thirteen methods on eight tasks: a random search over whole ranges would take more than a hundred core-hours.
     # Three changes of each method's settings are compared with none, on all tasks together, at a quarter of the budget.
-    tuning=Tuning(methods=METHODS, tasks=TASKS, settings=4, rungs=1, seeds=(0,), spread=0.5, share=0.25, pooled=True),
+    tuning=Tuning(
+        methods=METHODS,
+        tasks=TASKS,
+        settings=4,
+        rungs=1,
+        seeds=(0,),
+        spread=0.5,
+        share=0.25,
+        pooled=True,
+        ahead_on=len(TASKS) - 1,
+    ),
 )

@@ -42,12 +42,17 @@ class Tuning:
     """Budget of the last rung, as a share of the profile's."""
     pooled: bool = False
     """Whether a method's settings of the same number go on together on all tasks, by the mean of their ranks."""
+    ahead_on: int = 0
+    """Tasks on which the best change must earn more than the present settings; otherwise these stay (`pooled` around
+    the present settings only)."""
 
     def __post_init__(self) -> None:
         if self.rungs < 1 or self.eta < 2:
             raise ValueError(f"tuning needs at least 1 rung and eta 2, not {self.rungs} and {self.eta}")
         if not 0.0 < self.share <= 1.0 or not 0.0 < (1.0 if self.spread is None else self.spread) <= 1.0:
             raise ValueError(f"share and spread must be above 0 and at most 1, not {self.share} and {self.spread}")
+        if self.ahead_on and not (self.pooled and self.spread is not None):
+            raise ValueError("ahead_on needs a pooled search around the present settings: pooled and spread")
         if self.sizes[-1] < 1:
             raise ValueError(f"{self.settings} settings are too few for {self.rungs} rungs with eta {self.eta}")
         if not self.seeds or not set(self.seeds) <= set(TUNING_SEEDS) or len(set(self.seeds)) < len(self.seeds):

@@ -86,6 +86,27 @@ def pooled(scores: Sequence[Score], count: int) -> list[Score]:
     return [found for found in scores if (found.setting.method, found.setting.number) in chosen]
 
 
+def confirmed(winners: Sequence[Score], scores: Sequence[Score], ahead_on: int) -> list[Score]:
+    """Return the winners of a pooled search, or a method's present settings where its winner is not clearly better.
+
+    The best of several equal changes has the best mean rank more often than not, so a high rank is not enough.
+
+    Args:
+        winners: one setting of each method on every task.
+        scores: all scores of the last rung, in which setting 0 is the present one.
+        ahead_on: tasks on which a winner must have the higher return. Where the present settings failed, on some task,
+            the winner stays.
+    """
+    present = {(found.setting.method, found.setting.task): found for found in scores if found.setting.number == 0}
+    chosen = []
+    for method in dict.fromkeys(winner.setting.method for winner in winners):
+        pairs = [(won, present[method, won.setting.task]) for won in winners if won.setting.method == method]
+        ahead = sum(won.validation_return > before.validation_return for won, before in pairs)
+        stays = ahead < ahead_on and not any(before.failed for _, before in pairs)
+        chosen += [before if stays else won for won, before in pairs]
+    return chosen
+
+
 def survivors(scores: Sequence[Score], count: int) -> list[Score]:
     """Return the `count` best scores of every method on every task, in the given order; failed ones are left out."""
     groups: dict[tuple[str, str], list[Score]] = {}

@@ -20,7 +20,7 @@ from codesign_bench.sweep.runner import EXIT_ALL_DONE, run_sweep
 from codesign_bench.task import usable_tasks
 from codesign_bench.tuning.expected import expected, print_plan
 from codesign_bench.tuning.results import TABLE_FILE, WINNERS_FILE, check_tables, spent, write_table, write_winners
-from codesign_bench.tuning.scores import Score, pooled, score, survivors
+from codesign_bench.tuning.scores import Score, confirmed, pooled, score, survivors
 from codesign_bench.tuning.settings import budgets_of, cells_in_turn, settings_of
 
 
@@ -118,6 +118,8 @@ def tune(
         code = max(code, sweep(resolve_cells(cells_in_turn(cells))))
         found = [score(setting, rung, part, out) for setting, part in zip(alive, cells, strict=True)]
         winners = (pooled if tuning.pooled else survivors)(found, following)
+        if tuning.ahead_on and rung + 1 == tuning.rungs:
+            winners = confirmed(winners, found, tuning.ahead_on)
         alive = [winner.setting for winner in winners]
         scores += found
         kept += winners

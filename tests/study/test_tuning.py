@@ -41,6 +41,8 @@ def test_a_search_may_play_a_share_of_the_budget() -> None:
         ({"settings": 8}, "8 settings are too few for 3 rungs with eta 3"),
         ({"share": 0.0}, "above 0 and at most 1, not 0.0 and None"),
         ({"spread": 1.5}, "above 0 and at most 1, not 1.0 and 1.5"),
+        ({"ahead_on": 2, "spread": 0.5}, "needs a pooled search around the present settings"),
+        ({"ahead_on": 2, "pooled": True}, "needs a pooled search around the present settings"),
         ({"seeds": ()}, r"different ones from 0 to 9, not \(\)"),
         ({"seeds": (0, 0)}, "different ones from 0 to 9"),
         ({"seeds": (FIRST_REPORTED_SEED,)}, r"from 0 to 9, not \(100,\)"),

@@ -9,7 +9,7 @@ from builders import rising, store_cell
 from codesign_bench.cell.cell import Cell
 from codesign_bench.cell.variant import Variant
 from codesign_bench.storage.records import FAILED
-from codesign_bench.tuning.scores import Score, best, pooled, score, survivors
+from codesign_bench.tuning.scores import Score, best, confirmed, pooled, score, survivors
 from codesign_bench.tuning.settings import Setting
 
 SETTING = Setting("push", "gnn_ppo", 3, {"epochs": 2})
@@ -75,3 +75,34 @@ def test_a_pooled_choice_prefers_the_first_of_equals_and_no_setting_that_failed_
     ]
     going_on = [(found.setting.method, found.setting.task, found.setting.number) for found in pooled(scores, 1)]
     assert going_on == [("gnn_ppo", "push", 0), ("gnn_ppo", "scoop", 0), ("cma_es", "push", 0)]
+
+
+def test_a_change_replaces_the_present_settings_only_where_it_is_ahead_on_enough_tasks() -> None:
+    returns = {
+        "gnn_ppo": {"push": (1.0, 2.0), "scoop": (1.0, 2.0), "bounce": (1.0, 0.0)},  # ahead on two tasks
+        "cma_es": {"push": (1.0, 2.0), "scoop": (1.0, 1.0), "bounce": (1.0, 1.0)},  # equal is not ahead
+    }
+    scores = [
+        of(number, value, method, task)
+        for method, of_method in returns.items()
+        for task, values in of_method.items()
+        for number, value in enumerate(values)
+    ]
+    winners = [found for found in scores if found.setting.number == 1]
+
+    def chosen(ahead_on: int) -> dict[tuple[str, str], int]:
+        found = confirmed(winners, scores, ahead_on)
+        return {(of_one.setting.method, of_one.setting.task): of_one.setting.number for of_one in found}
+
+    def numbers(of_gnn: int, of_cma: int) -> dict[tuple[str, str], int]:
+        number = {"gnn_ppo": of_gnn, "cma_es": of_cma}
+        return {(method, task): number[method] for method in returns for task in returns[method]}
+
+    assert chosen(1) == numbers(1, 1)
+    assert chosen(2) == numbers(1, 0)
+    assert chosen(3) == numbers(0, 0)
+
+
+def test_present_settings_that_failed_are_replaced_by_the_best_change() -> None:
+    scores = [of(0, nan), of(1, -5.0), of(0, 3.0, task="scoop"), of(1, 2.0, task="scoop")]
+    assert [found.setting.number for found in confirmed([scores[1], scores[3]], scores, 2)] == [1, 1]

@@ -8,22 +8,25 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from rich.console import Console
 from toy_failing import LONGEST
 from toy_tuning import return_by_hand
 
 from codesign_bench import load_results
 from codesign_bench.cli import main
 from codesign_bench.errors import UserError
+from codesign_bench.plugins import import_modules
 from codesign_bench.registry import IMPORTS_VARIABLE
 from codesign_bench.storage.frames import load_evaluations
 from codesign_bench.storage.locks import is_locked
 from codesign_bench.study import Study, Tuning
 from codesign_bench.tuning.results import read_winners
-from codesign_bench.tuning.tune import budgets_of, tuning_of
+from codesign_bench.tuning.tune import budgets_of, tune, tuning_of
 from toy import ToyReach
 
 pytestmark = pytest.mark.usefixtures("toy")
@@ -167,6 +170,22 @@ def test_a_setting_that_fails_goes_no_further(tmp_path: Path) -> None:
     kept = rows[rows["kept"] == 1]
     assert len(kept) == 2
     assert (kept["length"] <= LONGEST).all()
+
+
+@pytest.mark.parametrize(("ahead_on", "replaced"), [(0, True), (1, True), (2, False)])
+def test_present_settings_stay_unless_a_change_is_ahead_on_enough_tasks(
+    ahead_on: int, replaced: bool, tmp_path: Path
+) -> None:
+    import_modules(["toy_tuning"])
+    size = Tuning(methods=("toy_aim",), tasks=("toy_reach",), settings=4, rungs=1, seeds=(0,), spread=0.9, pooled=True)
+    search = replace(size, ahead_on=ahead_on)
+    assert tune("toy", search, profile="quick", out=tmp_path, console=Console(quiet=True), steps=50, jobs=1) == 0
+    rows = table(tmp_path)
+    present = rows["validation_return"][0]
+    assert (rows["validation_return"] > present).any(), "some change is better"
+    (kept,) = rows["setting"][rows["kept"] == 1]
+    assert (kept != 0) == replaced
+    assert bool(read_winners(tmp_path / "tuned.json")["toy_reach", "toy_aim"]) == replaced
 
 
 def test_budgets_are_parts_of_the_profiles_or_of_the_given_one() -> None:

@@ -3,7 +3,8 @@
 Numbers are means over seeds of the last evaluation of each; seeds that stopped early are left out. The normalised
 score is 0 for a random tool held still and 1 for the best known (`docs/reference_points.md`); only this score is
 averaged over tasks. Minutes are the median over cells as they ran, in parallel with others. The time of a cell that
-shared its core says nothing about the method.
+shared its core says nothing about the method. The late gain is how much the mean curve still rose over the last third
+of its steps, in normalised score: near 0, the budget was long enough.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from codesign_bench.stats import (
     CONFIDENCE,
     MIN_SEEDS,
     final_values,
+    late_gains,
     mean_across,
     mean_t_interval,
     normalized_score,
@@ -43,6 +45,8 @@ INTERVAL = (
 """The kind of interval, written on the figure."""
 DIGITS = 2
 SCORE = "normalized_score"
+OF_SCORE = ("normalised score", "late gain")
+"""Columns of the text that need reference points."""
 AVERAGE = "average"
 """In the place of a task: the mean over all tasks that have reference points."""
 SAME_BUDGET = 0.02
@@ -64,8 +68,9 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     Returns:
         Columns task, method, label, seeds, env_steps (mean over seeds), then for each quantity ("return_mean",
         "success_rate", "normalized_score") itself, `<quantity>_low` and `<quantity>_high` (NaN for fewer than three
-        seeds), and minutes (median over seeds). The normalised score is NaN where the task has no reference points,
-        everything else but seeds (the fewest) and steps is NaN in an average.
+        seeds), late_gain (of the normalised score over the last third of the steps), and minutes (median over seeds).
+        The normalised score and its gain are NaN where the task has no reference points, everything else but seeds
+        (the fewest) and steps is NaN in an average.
 
     Raises:
         UserError: a column, or every row of the default variant, is missing.
@@ -74,6 +79,7 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
     labels = method_labels(frame)
     finals = {name: final_values(rows, name) for name in (*QUANTITIES, "wall_s")}
     scales = references(reference_points_in(rows))
+    gains = late_gains(rows, "return_mean").set_index(["task", "method"])["late_gain"]
     result, scores = [], dict[str, dict[str, np.ndarray]]()
     for task in task_order(rows["task"]):
         for method in in_order(rows.loc[rows["task"] == task, "method"]):
@@ -95,6 +101,8 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
             if task in scales:
                 earned = own["return_mean"]["return_mean"].to_numpy()
                 scores.setdefault(method, {})[task] = np.asarray(normalized_score(earned, scales[task]))
+            scored = [normalized_score(value, scales.get(task)) for value in (float(gains[task, method]), 0.0)]
+            row["late_gain"] = scored[0] - scored[1]  # a difference of returns, in units of the scale
             result.append({**row, "minutes": float(own["wall_s"]["wall_s"].median()) / 60.0})
     table = pd.DataFrame(result)
     return pd.concat([table, *_averages(table, scores)], ignore_index=True)
@@ -138,7 +146,7 @@ def texts(frame: pd.DataFrame) -> dict[str, str]:
     """
     table = data(frame)
     scored = table[SCORE].notna().any()
-    header = ["task", "method", "seeds", "steps", "return", "success", "normalised score", "minutes a cell"]
+    header = ["task", "method", "seeds", "steps", "return", "success", *OF_SCORE, "minutes a cell"]
     count = per_task(table.dropna(subset=[SCORE]))["task"].nunique()
     rows = [
         [
@@ -147,13 +155,14 @@ def texts(frame: pd.DataFrame) -> dict[str, str]:
             str(row["seeds"]),
             f"{row['env_steps']:,.0f}",
             *(_with_interval(row, name) for name in (*QUANTITIES, SCORE)),
+            "-" if math.isnan(row["late_gain"]) else f"{row['late_gain']:+.{DIGITS}f}",
             "-" if math.isnan(row["minutes"]) else f"{row['minutes']:.1f}",
         ]
         for row in table.to_dict("records")
     ]
     if not scored:
-        unknown = header.index("normalised score")
-        header, *rows = ([*line[:unknown], *line[unknown + 1 :]] for line in (header, *rows))
+        unknown = header.index(OF_SCORE[0])
+        header, *rows = ([*line[:unknown], *line[unknown + len(OF_SCORE) :]] for line in (header, *rows))
     return {"md": markdown(header, rows), "tex": latex(header, rows)}
 
 

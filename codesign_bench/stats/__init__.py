@@ -6,6 +6,7 @@ from codesign_bench.stats.improvement import performance_profile, probability_of
 from codesign_bench.stats.multiplicity import holm
 from codesign_bench.stats.normalization import Reference, normalized_score
 from codesign_bench.stats.permutation import difference_p, jonckheere_p, sign_flip_p, stratified_p
+from codesign_bench.stats.plateau import late_gains
 from codesign_bench.stats.proportions import proportion_interval, proportion_test
 from codesign_bench.stats.reaching import mean_along, monotone, steps_to_reach
 from codesign_bench.stats.student import (
@@ -35,6 +36,7 @@ __all__ = [
     "holm",
     "interquartile_mean",
     "jonckheere_p",
+    "late_gains",
     "mean",
     "mean_across",
     "mean_along",

@@ -112,12 +112,21 @@ def test_a_normalised_score_is_0_for_idling_and_1_for_the_best_known() -> None:
     assert row["normalized_score_high"] == pytest.approx((row["return_mean_high"] + 1.0) / 8.0)
 
 
+def test_the_late_gain_is_what_the_mean_curve_gains_in_its_last_third_in_units_of_the_score() -> None:
+    rising = [{"env_steps": 100 * step, "return_mean": float(step)} for step in range(10)]
+    start = cells("gnn_ppo", [0.0]).iloc[:1]
+    frame = pd.concat([start.assign(**point) for point in rising])
+    (row,) = figure.data(referenced(frame, -1.0, 7.0)).to_dict("records")
+    assert row["late_gain"] == pytest.approx(3.0 / 8.0)
+    assert "| 1.25 | +0.38 |" in figure.texts(referenced(frame, -1.0, 7.0))["md"]
+
+
 def test_without_reference_points_there_is_no_score() -> None:
     frame = pd.concat([cells("gnn_ppo", [1.0] * 3), cells("gnn_ppo", [1.0] * 3, task="scoop")])
     table = figure.data(frame)
-    assert table["normalized_score"].isna().all()
+    assert table[["normalized_score", "late_gain"]].isna().all(axis=None)
     assert table["task"].tolist() == ["push", "scoop"]
-    assert "normalised" not in figure.texts(frame)["md"]
+    assert not any(name in figure.texts(frame)["md"] for name in figure.OF_SCORE)
 
 
 def test_normalised_scores_alone_are_averaged_over_the_tasks_that_have_them() -> None:
@@ -141,8 +150,8 @@ def test_normalised_scores_alone_are_averaged_over_the_tasks_that_have_them() ->
     assert np.isnan(row["return_mean"])
     assert np.isnan(row["success_rate"])
     text = figure.texts(frame)["md"]
-    assert "| average of 2 tasks | gnn_ppo | 3 | 1,000 | - | - | 0.75 [0.13, 1.37] | - |" in text
-    assert "| lift cup | gnn_ppo | 3 | 1,000 | 9.00 | 0.90 | - | 30.0 |" in text
+    assert "| average of 2 tasks | gnn_ppo | 3 | 1,000 | - | - | 0.75 [0.13, 1.37] | - | - |" in text
+    assert "| lift cup | gnn_ppo | 3 | 1,000 | 9.00 | 0.90 | - | - | 30.0 |" in text
     shown = {axes.get_title() for axes in figure.draw(frame).axes if axes.get_visible()}
     assert shown == {"push", "scoop", "lift cup"}
 

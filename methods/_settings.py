@@ -8,9 +8,9 @@ from typing import Any
 from codesign_bench.config.settings import Settings, sourced
 
 Tuned = Mapping[str, Mapping[str, Any]]
-"""Profile ("laptop", "quick") -> its settings; those of `quick` are added to those of `laptop`."""
+"""Part of a profile ("laptop", "quick") -> its settings."""
 
-LAYERS = {"laptop": ("laptop",), "quick": ("laptop", "quick")}
+LAYERS = {"laptop": ("laptop",), "workstation": ("laptop",), "quick": ("laptop", "quick")}
 """Profile -> the parts of a `Tuned` table that it consists of; later ones override. Other profiles have none."""
 
 PPO: Tuned = {
@@ -34,7 +34,7 @@ PPO_BY_TASK: Mapping[str, Mapping[str, Any]] = {
     "scoop": {"control_log_std": -1.0},
     "scoop_3d": {"gamma": 0.99, "control_log_std": -1.5},
 }
-"""Settings of `laptop` and `quick` that differ for a task, the same for every PPO-based method."""
+"""Settings of our own profiles that differ for a task, the same for every PPO-based method."""
 
 SMALL_PPO = {"batch_size": 600, "minibatch_size": 150, "epochs": 2, "design_epochs": 2, "design_minibatch_size": 2}
 SMALL_GRAPHS = {

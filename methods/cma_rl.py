@@ -82,7 +82,7 @@ class CmaRl(GivenDesignMethod[Config]):
         return {
             **super().profile(profile, task_name),
             **tuned(profile, TUNED),
-            **tuned_for(profile, task_name, TUNED_BY_TASK, profiles=("laptop",)),
+            **tuned_for(profile, task_name, TUNED_BY_TASK, profiles=("laptop", "workstation")),
         }
 
     def give_designs(self, explorer: Explorer, steps: int, slots: int) -> tuple[Explorer, int]:

@@ -295,6 +295,7 @@ class LiftCup(Task):
     run_settings: ClassVar[ByProfile] = {
         "quick": {"steps": 400_000},
         "laptop": {"steps": 700_000},
+        "workstation": {"steps": 1_500_000},
     }
     outcome = Quantity("height of the cup's lowest corner while upright", "m")
     max_slots = MAX_SLOTS

@@ -329,7 +329,10 @@ class Scoop3D(Task):
     success_steps = HELD_STEPS
     failure_condition = f"the tool has been clear for {LOST_STEPS} control steps in all without success"
 
-    run_settings: ClassVar[ByProfile] = {"laptop": {"steps": 500_000, "evaluations": 10}}
+    run_settings: ClassVar[ByProfile] = {
+        "laptop": {"steps": 500_000, "evaluations": 10},
+        "workstation": {"steps": 1_500_000},
+    }
     outcome = Quantity("balls held above the line", "balls")
     max_slots = 18  # physics costs far more than a call of the policy: as fast as more, in less memory
     # Balls that collide at up to 2.8 m/s overlap for a step of 1/120 s, also right after pouring; tools start clear of

@@ -52,6 +52,11 @@ BUILT_IN: Mapping[str, Profile] = {
             "under an hour per 2D task on two cores (default)",
             sourced({"steps": 1_000_000, "evaluations": 20}, "ours"),
         ),
+        Profile(
+            "workstation",
+            "for conclusions: the settings of `laptop`, and budgets at whose end curves hardly rise",
+            sourced({"steps": 3_000_000, "evaluations": 30}, "ours"),
+        ),
     )
 }
 

@@ -47,7 +47,7 @@ def test_a_pipe_gets_plain_lines_although_a_notebook_wants_colours(tmp_path: Pat
         (["run", "--method", "toy_search", "--task", "pull"], "toy_reach"),
         (["run", "--method", ",", "--task", "toy_reach"], "--method"),
         (["run", "--task", "toy_reach"], "--method"),
-        ([*RUN, "--profile", "fast"], "quick, laptop, paper"),
+        ([*RUN, "--profile", "fast"], "quick, laptop, workstation, paper"),
         ([*RUN, "speed=1"], "episodes"),
         ([*RUN, "episodes=few"], "expected an integer"),
         ([*RUN, "threads=4096"], "cores"),

@@ -82,7 +82,7 @@ def test_a_key_must_be_known_to_a_selected_method(search: type[Method[Any]], ove
 
 
 def test_an_unknown_profile_lists_the_profiles(search: type[Method[Any]]) -> None:
-    with pytest.raises(UserError, match="unknown profile 'fast'; choose from: quick, laptop, paper"):
+    with pytest.raises(UserError, match="unknown profile 'fast'; choose from: quick, laptop, workstation, paper"):
         resolve(search, "toy_reach", "fast")
 
 

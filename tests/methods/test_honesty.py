@@ -39,6 +39,8 @@ TOLD = {
     ("shared_arch", "paper"): RATES,  # The paper's table of baselines prints their rates, one for all tasks.
     ("cma_rl", "paper"): RATES,
     ("cma_rl", "laptop"): SEARCHED,  # by the common search, on push
+    ("cma_rl", "workstation"): SEARCHED,
+    ("hwasp_minimal", "workstation"): DESIGN,
     ("hwasp_minimal", "laptop"): DESIGN,  # A bare vector needs larger steps than a network (ours).
     ("hwasp_minimal", "quick"): DESIGN,
 }

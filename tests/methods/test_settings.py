@@ -21,6 +21,11 @@ def test_quick_adds_to_laptop_and_every_value_names_the_profile_that_set_it() ->
     }
 
 
+def test_a_workstation_trains_longer_with_the_settings_of_a_laptop() -> None:
+    assert settings.tuned("workstation", TABLE) == settings.tuned("laptop", TABLE)
+    assert settings.ppo_settings("workstation", "lift_cup") == settings.ppo_settings("laptop", "lift_cup")
+
+
 def test_profiles_of_others_set_nothing() -> None:
     assert settings.tuned("paper", TABLE) == {}
     assert settings.ppo_settings("paper", "lift_cup") == {}

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.claims.evidence import load_evidence
 from codesign_bench.claims.verify import Row, by_rule, contradicted, judge
 from codesign_bench.figures.source import Request, curves_with_references
@@ -42,6 +43,7 @@ PAGES = {
 }
 """Every page and the results, or the folder of archives, that its tables show."""
 PAPERS_METHOD = "gnn_ppo"
+SEPARATE = Variant.of(credit="separate")
 NOT_MEASURED = "Reference points of these results are not measured yet.\n"
 TABLE = re.compile(r"(<!-- (?P<name>\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -104,11 +106,11 @@ def _response(results: Path) -> str:
     """Return what a separate credit, and then the response term of `stackelberg_ppo`, add to success on each task."""
     last = final_values(_curves(results), "success_rate")
 
-    def of(task: str, method: str, variant: str) -> np.ndarray:
-        rows = last[(last["task"] == task) & (last["method"] == method) & (last["variant"] == variant)]
+    def of(task: str, method: str, variant: Variant) -> np.ndarray:
+        rows = last[(last["task"] == task) & (last["method"] == method) & (last["variant"] == variant.name)]
         return rows["success_rate"].to_numpy()
 
-    steps = ((PAPERS_METHOD, "default"), (PAPERS_METHOD, "credit-separate"), ("stackelberg_ppo", "default"))
+    steps = ((PAPERS_METHOD, DEFAULT), (PAPERS_METHOD, SEPARATE), ("stackelberg_ppo", DEFAULT))
     found = {task: [of(task, *step) for step in steps] for task in in_order("tasks", set(last["task"]))}
     found = {task: samples for task, samples in found.items() if all(len(sample) for sample in samples)}
     lines = [

@@ -33,7 +33,7 @@ from codesign_bench.task import (
 from codesign_bench.task.robot import ArmReport, DeployedSimulator
 
 from ._carriers import CARRIER_SCENE, LEVEL, Carrier, Gantry, HeldTool, ToolShape, pybullet, run
-from ._marks import PICTURE_SHAPE, Camera, MarkList, Marks
+from ._marks import PICTURE_SHAPE, Camera, MarkList, Marks, PictureMarks
 from ._scene import COLOURS, Clock
 from ._zero_pages import zeros_given_back
 
@@ -362,7 +362,7 @@ class BulletSimulator(DeployedSimulator):
             physicsClientId=self.worlds[slot],
         )
         pixels = np.asarray(picture[2], dtype=np.uint8).reshape(height, width, 4)[..., :3]
-        marks = Marks(pixels, np.reshape(view, (4, 4)) @ np.reshape(projection, (4, 4)))
+        marks = PictureMarks(pixels, np.reshape(view, (4, 4)) @ np.reshape(projection, (4, 4)))
         self.mark(slot, marks)
         return marks.frame()
 

@@ -5,6 +5,7 @@ Lengths are in m.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,8 +33,20 @@ class Camera:
     far: float = 10.0
 
 
-class Marks:
-    """Lines and dots on a picture of a scene, at positions in the scene."""
+class Marks(ABC):
+    """Lines and dots at positions in a scene: what a task draws beside its bodies."""
+
+    @abstractmethod
+    def line(self, points: Floats, colour: str, width: int = 2) -> None:
+        """Draw a line through `points` (n, 3), m; `width` in pixels."""
+
+    @abstractmethod
+    def dot(self, point: Floats, colour: str, radius: int = 3) -> None:
+        """Draw a disc at `point` (3,), m; `radius` in pixels."""
+
+
+class PictureMarks(Marks):
+    """Marks on a picture of the scene."""
 
     def __init__(self, pixels: Frame, to_clip: Floats) -> None:
         self._image = Image.fromarray(pixels)
@@ -41,11 +54,11 @@ class Marks:
         self._to_clip = to_clip
 
     def line(self, points: Floats, colour: str, width: int = 2) -> None:
-        """Draw a line through `points` (n, 3), m; `width` in pixels."""
+        """Draw a line."""
         self._draw.line([tuple(pixel) for pixel in self._at(points).tolist()], fill=colour, width=width)
 
     def dot(self, point: Floats, colour: str, radius: int = 3) -> None:
-        """Draw a disc at `point` (3,), m; `radius` in pixels."""
+        """Draw a disc."""
         ((x, y),) = self._at(point[None, :3]).tolist()
         self._draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=colour)
 
@@ -63,9 +76,9 @@ class Marks:
 
 
 class MarkList(Marks):
-    """Keeps what is drawn on it as items instead of pixels."""
+    """Marks that are kept as items instead of pixels."""
 
-    def __init__(self) -> None:  # no picture, so not the parent's
+    def __init__(self) -> None:
         self.items: list[Item] = []
 
     def line(self, points: Floats, colour: str, width: int = 2) -> None:

@@ -69,32 +69,51 @@ def usual_way(work: Workload) -> Speed:
 
     They act on one state per call; minibatches are lists of single graphs, joined for every update.
     """
+    policy = _usual_net(work, load_task(work.task).control_space.size, "control_index_mlp")
+    value = _usual_net(work, 1, "value_mlp")
+    started = time.perf_counter()
+    seen = _usual_rollout(load_task(work.task), policy, value)
+    rollout = len(seen) / (time.perf_counter() - started)
+    started = time.perf_counter()
+    _usual_update(seen, (policy, value), work.minibatch_size)
+    update = USUAL_MINIBATCHES * work.minibatch_size / (time.perf_counter() - started)
+    how = f"over {USUAL_ROLLOUT_STEPS} steps and {USUAL_MINIBATCHES} minibatches, on one core, extrapolated"
+    return Speed(rollout, update, peak_megabytes(), how=how)
+
+
+def _usual_net(work: Workload, outputs: int, index_widths: str) -> Any:
+    """Return a linear input layer, graph convolutions, then a separate MLP for every node.
+
+    Args:
+        work: names the task and the widths.
+        outputs: size of the output.
+        index_widths: the hyperparameter of `gnn_ppo` with the widths of the MLPs.
+    """
     import torch
     from torch import nn
-    from torch_geometric.data import Batch, Data
     from torch_geometric.nn import GraphConv
 
     task = load_task(work.task)
-    convolution_widths: tuple[int, ...] = configured("control_gnn", work)
-    layout, nodes = task.layout, task.tool_graph.num_nodes
-    width = layout.goal.stop + 2 + _node_width(task)
+    width, nodes = task.layout.goal.stop + 2 + _node_width(task), task.tool_graph.num_nodes
+    sizes: tuple[int, ...] = configured("control_gnn", work)
+    last: tuple[int, ...] = configured(index_widths, work)
+
+    def head() -> nn.Sequential:
+        layers: list[nn.Module] = []
+        for a, b in zip((sizes[-1], *last[:-1]), last, strict=True):
+            layers += [nn.Linear(a, b), nn.Tanh()]
+        return nn.Sequential(*layers, nn.Linear(last[-1], outputs))
 
     class Net(nn.Module):
-        """A linear input layer, graph convolutions, then a separate MLP for every node."""
+        """Maps joined graphs to the output of their first node."""
 
-        def __init__(self, outputs: int, index_widths: tuple[int, ...]) -> None:
+        def __init__(self) -> None:
             super().__init__()
-            sizes = convolution_widths
             self.first = nn.Linear(width, sizes[0])
             self.convolutions = nn.ModuleList(
                 GraphConv(a, b) for a, b in zip((sizes[0], *sizes[:-1]), sizes, strict=True)
             )
-            self.heads = nn.ModuleList()
-            for _ in range(nodes):
-                layers: list[nn.Module] = []
-                for a, b in zip((sizes[-1], *index_widths[:-1]), index_widths, strict=True):
-                    layers += [nn.Linear(a, b), nn.Tanh()]
-                self.heads.append(nn.Sequential(*layers, nn.Linear(index_widths[-1], outputs)))
+            self.heads = nn.ModuleList(head() for _ in range(nodes))
 
         def forward(self, batch: Any) -> Any:
             x = self.first(batch.x)
@@ -103,41 +122,44 @@ def usual_way(work: Workload) -> Speed:
             per_node = x.view(-1, nodes, x.shape[-1])
             return torch.stack([head(per_node[:, node]) for node, head in enumerate(self.heads)], dim=1)[:, 0]
 
-    policy = Net(task.control_space.size, configured("control_index_mlp", work))
-    value = Net(1, configured("value_mlp", work))
-    optimizers = [torch.optim.Adam(net.parameters(), lr=1e-4) for net in (policy, value)]
+    return Net()
+
+
+def _usual_rollout(task: Task, policy: Any, value: Any) -> list[Any]:
+    """Play one environment with random tools, a state per call; return the graphs of all states."""
+    import torch
+    from torch_geometric.data import Batch, Data
+
     pairs = task.tool_graph.edges + tuple((b, a) for a, b in task.tool_graph.edges)
     edges = torch.tensor(pairs, dtype=torch.long).t().reshape(2, -1)
-
-    def graph(observation: np.ndarray) -> Any:
-        return Data(x=torch.from_numpy(_node_features(task, observation)), edge_index=edges)
-
     episodes, slot, rng = Episodes(task, 1), np.array([0]), np.random.default_rng(0)
     seen, over = [], True
-    started = time.perf_counter()
     for _ in range(USUAL_ROLLOUT_STEPS):
         if over:
             episodes.begin(slot, task.sample_instances(rng, 1))
             episodes.design(slot, rng.uniform(-1.0, 1.0, size=(1, task.design_space.size)))
-        state = graph(episodes.observation[0])
+        state = Data(x=torch.from_numpy(_node_features(task, episodes.observation[0])), edge_index=edges)
         with torch.no_grad():
             batch = Batch.from_data_list([state])
             control, _ = policy(batch), value(batch)
         _, terminated, truncated = episodes.control(slot, control.numpy().astype(np.float64))
         over = bool(terminated[0] or truncated[0])
         seen.append(state)
-    rollout = USUAL_ROLLOUT_STEPS / (time.perf_counter() - started)
-    rows = rng.integers(len(seen), size=(USUAL_MINIBATCHES, work.minibatch_size))
-    started = time.perf_counter()
-    for part in rows:
+    return seen
+
+
+def _usual_update(seen: list[Any], nets: tuple[Any, ...], minibatch_size: int) -> None:
+    """Take a gradient step of every net for each of a few minibatches of graphs."""
+    import torch
+    from torch_geometric.data import Batch
+
+    optimizers = [torch.optim.Adam(net.parameters(), lr=1e-4) for net in nets]
+    for part in np.random.default_rng(0).integers(len(seen), size=(USUAL_MINIBATCHES, minibatch_size)):
         batch = Batch.from_data_list([seen[row] for row in part])
-        for net, optimizer in zip((policy, value), optimizers, strict=True):
+        for net, optimizer in zip(nets, optimizers, strict=True):
             optimizer.zero_grad()
             net(batch).square().mean().backward()
             optimizer.step()
-    update = USUAL_MINIBATCHES * work.minibatch_size / (time.perf_counter() - started)
-    how = f"over {USUAL_ROLLOUT_STEPS} steps and {USUAL_MINIBATCHES} minibatches, on one core, extrapolated"
-    return Speed(rollout, update, peak_megabytes(), how=how)
 
 
 def _node_width(task: Task) -> int:

@@ -24,7 +24,7 @@ def coloured(picture: np.ndarray) -> np.ndarray:
 
 def test_a_dot_lies_where_the_matrix_puts_it() -> None:
     # Without a perspective, the scene's x and y are shares of half a picture, from its centre to the right and upwards.
-    drawn = marks.Marks(white(), np.eye(4))
+    drawn = marks.PictureMarks(white(), np.eye(4))
     drawn.dot(np.array([0.5, 0.5, 0.0]), RED, radius=2)
     rows, columns = coloured(drawn.frame()).T
     assert (rows.mean(), columns.mean()) == (10.0, 60.0)
@@ -38,14 +38,14 @@ def test_twice_as_far_is_half_as_far_from_the_centre() -> None:
     perspective[2, 3] = 1.0
     columns = []
     for distance in (1.0, 2.0):
-        drawn = marks.Marks(white(), perspective)
+        drawn = marks.PictureMarks(white(), perspective)
         drawn.dot(np.array([0.5, 0.0, distance]), RED, radius=1)
         columns.append(coloured(drawn.frame())[:, 1].mean() - 40.0)
     assert columns == [20.0, 10.0]
 
 
 def test_a_line_goes_through_its_points() -> None:
-    drawn = marks.Marks(white(), np.eye(4))
+    drawn = marks.PictureMarks(white(), np.eye(4))
     drawn.line(np.array([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]]), RED, width=1)
     rows, columns = coloured(drawn.frame()).T
     assert set(rows) == {20}

@@ -35,12 +35,12 @@ def sweep_the_baseline(results: Path, profile: str, log: Log) -> None:
 
 
 def deploy(results: Path, profile: str, log: Log) -> None:
-    """Play the paper's trials on the arm with the first seed of our method, and with every other finished seed.
+    """Play the paper's trials on the arm with every finished seed of our method.
 
     Trials in `results` are not played again.
 
     Raises:
-        UserError: the cell of the first seed is not done.
+        UserError: no seed is finished; the message names the experiment's first.
     """
     from codesign_bench.deployment.conditions import TRIAL
     from codesign_bench.deployment.deploy import Order
@@ -52,8 +52,8 @@ def deploy(results: Path, profile: str, log: Log) -> None:
     for task_name in ON_AN_ARM:
         done = (cell.record for cell in find_cells(results) if cell.is_done and cell.has_policy)
         wanted = (task_name, OURS, DEFAULT)
-        others = {record.seed for record in done if (record.task, record.method, record.variant) == wanted}
-        for seed in sorted({0} | others):
+        finished = {record.seed for record in done if (record.task, record.method, record.variant) == wanted}
+        for seed in sorted(finished or ONE_SEED):
             if not (results / FOLDER / task_name / protocol_file(seed)).exists():
                 folder = Cell(task_name, OURS, seed=seed, profile=profile).folder(results)
                 policy, task = policy_and_task(folder, task_name)

@@ -14,6 +14,7 @@ from rich.console import Console
 from builders import VERSION_0_1_0
 from codesign_bench.claims import deployment
 from codesign_bench.claims.fine_tuning import SEEDS_TO_DECIDE
+from codesign_bench.errors import UserError
 from codesign_bench.storage.records import CellRecord
 from codesign_bench.studies.corl2023 import experiments
 from codesign_bench.studies.corl2023.experiments import EXPERIMENTS
@@ -49,13 +50,17 @@ def test_tasks_have_what_their_experiments_ask_for() -> None:
         assert task.in_cutout(task.evaluation_instances(), fraction).any()
 
 
-def test_the_trials_on_an_arm_are_played_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    cell = Path("lift_cup/gnn_ppo/default/seed-00")
+@pytest.mark.parametrize(("seed", "table"), [(0, "protocol.csv"), (100, "protocol-seed-100.csv")])
+def test_the_trials_on_an_arm_are_played_once_with_whatever_seed_is_finished(
+    seed: int, table: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    default = Path("lift_cup/gnn_ppo/default")
+    cell = default / f"seed-{seed:02d}"
     monkeypatch.setattr(experiments, "ON_AN_ARM", ("lift_cup",))
-    shutil.copytree(VERSION_0_1_0 / cell, tmp_path / cell)
+    shutil.copytree(VERSION_0_1_0 / default / "seed-00", tmp_path / cell)
     record = CellRecord.read(tmp_path / cell)
     assert record is not None
-    replace(record, task_version=load_task("lift_cup").version).write(tmp_path / cell)
+    replace(record, seed=seed, task_version=load_task("lift_cup").version).write(tmp_path / cell)
 
     def played() -> str:
         console = Console(record=True, width=300, file=io.StringIO())
@@ -63,5 +68,10 @@ def test_the_trials_on_an_arm_are_played_once(tmp_path: Path, monkeypatch: pytes
         return console.export_text()
 
     assert "own-tool-1-trial-1: " in played()
-    assert len(pd.read_csv(tmp_path / "deployment" / "lift_cup" / "protocol.csv")) == 4 * 5
+    assert len(pd.read_csv(tmp_path / "deployment" / "lift_cup" / table)) == 4 * 5
     assert "own-tool-1-trial-1: " not in played()
+
+
+def test_without_a_finished_seed_the_first_is_asked_for(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="seed-00"):
+        experiments.deploy(tmp_path, "laptop", Console(quiet=True).print)

@@ -27,12 +27,14 @@ from codesign_bench.stats import final_values, welch_across
 from codesign_bench.storage.reference_points import FILE, POINTS, load_reference_points
 from codesign_bench.study import DEFAULT_STUDY, load_study
 from codesign_bench.text_tables import markdown
+from codesign_bench.tuning.results import TABLE_FILE
 
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "results" / "reference"
 LONGER = ROOT / "results" / "longer"
 ALL_METHODS = ROOT / "results" / "all_methods"
 SUBMISSIONS = ROOT / "results" / "submissions"
+SEARCH = ROOT / "results" / "search"
 PAGES = {
     ROOT / "docs" / "results.md": REFERENCE,
     ROOT / "docs" / "reference_points.md": REFERENCE,
@@ -40,6 +42,7 @@ PAGES = {
     REFERENCE / "README.md": REFERENCE,
     LONGER / "README.md": LONGER,
     ALL_METHODS / "README.md": ALL_METHODS,
+    ROOT / "results" / "TUNING.md": SEARCH,
 }
 """Every page and the results, or the folder of archives, that its tables show."""
 PAPERS_METHOD = "gnn_ppo"
@@ -132,6 +135,31 @@ def _added(samples: Sequence[np.ndarray]) -> tuple[tuple[np.ndarray, np.ndarray]
     return tuple((later, earlier) for earlier, later in pairwise(samples))
 
 
+def _search(results: Path) -> str:
+    """Return what the common search found for every method, one line each."""
+    table = pd.read_csv(results / TABLE_FILE)
+    lines = []
+    for method in in_order("methods", table["method"].unique()):
+        own = table[table["method"] == method]
+        returns = own.pivot(index="task", columns="setting", values="validation_return")
+        ranks = returns.rank(axis="columns", ascending=False).mean()
+        present, best = returns.columns[0], ranks.iloc[1:].idxmin()
+        ahead = int((returns[best] > returns[present]).sum())
+        (kept,) = own.loc[own["kept"] == 1, "setting"].unique()
+        lines.append(
+            [
+                f"`{method}`",
+                f"{own['env_steps'].sum():,}",
+                f"{ranks[present]:.1f}",
+                f"{best}: {ranks[best]:.1f}",
+                f"{ahead} of {len(returns)}",
+                "as before" if kept == present else f"change {kept}",
+            ]
+        )
+    header = ["method", "steps of the search", "mean rank of the present settings", "best change: its mean rank"]
+    return markdown([*header, "tasks on which it is ahead", "used"], lines)
+
+
 def _difference(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
     """Return the mean difference within pairs, with Welch's interval and p-value."""
     found = welch_across(pairs)
@@ -150,6 +178,7 @@ MAKERS: dict[str, Callable[[Path], str]] = {
     "reference_points": _reference_points,
     "script": _script,
     "response": _response,
+    "search": _search,
     "leaderboard": lambda folder: leaderboard(folder, "../results/submissions"),
     "claims": lambda results: by_rule(_judged(results)),
     "contradicted": lambda results: contradicted(_judged(results)),

@@ -55,8 +55,11 @@ class Config:
         check_values(self)
 
 
-TUNED: Tuned = {"laptop": {}, "quick": {"cells": 50}}
-"""Settings tuned for this method (ours)."""
+TUNED: Tuned = {
+    "laptop": {"cells": 136, "neighbours": 7, "regression_share": 0.4797, "crossing_eta": 5.47, "batch_episodes": 68},
+    "quick": {"cells": 50},
+}
+"""Settings tuned for this method (ours): those of `laptop` by the common search (results/TUNING.md)."""
 
 
 def scaled(values: Floats, *boxes: Box) -> Floats:

@@ -54,7 +54,7 @@ BUILT_IN: Mapping[str, Profile] = {
         ),
         Profile(
             "workstation",
-            "for conclusions: the settings of `laptop`, and budgets at whose end curves hardly rise",
+            "for conclusions: the settings of `laptop`, and longer budgets, so that curves hardly rise at the end",
             sourced({"steps": 3_000_000, "evaluations": 30}, "ours"),
         ),
     )

@@ -20,8 +20,11 @@ import pandas as pd
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.claims.evidence import load_evidence
 from codesign_bench.claims.verify import Row, by_rule, contradicted, judge
+from codesign_bench.config.profiles import BUILT_IN
+from codesign_bench.config.resolve import resolve
 from codesign_bench.figures.source import Request, curves_with_references
-from codesign_bench.registry import in_order, load_module
+from codesign_bench.method import load_method
+from codesign_bench.registry import built_in, in_order, load_module
 from codesign_bench.sharing.leaderboard import leaderboard
 from codesign_bench.stats import final_values, welch_across
 from codesign_bench.storage.reference_points import FILE, POINTS, load_reference_points
@@ -38,6 +41,7 @@ SEARCH = ROOT / "results" / "search"
 PAGES = {
     ROOT / "docs" / "results.md": REFERENCE,
     ROOT / "docs" / "reference_points.md": REFERENCE,
+    ROOT / "docs" / "budgets.md": REFERENCE,
     ROOT / "docs" / "leaderboard.md": SUBMISSIONS,
     REFERENCE / "README.md": REFERENCE,
     LONGER / "README.md": LONGER,
@@ -135,6 +139,15 @@ def _added(samples: Sequence[np.ndarray]) -> tuple[tuple[np.ndarray, np.ndarray]
     return tuple((later, earlier) for earlier, later in pairwise(samples))
 
 
+def _budgets() -> str:
+    """Return the environment steps of a cell on every task under each built-in profile."""
+    method = load_method(PAPERS_METHOD)
+    rows = [
+        [task, *(f"{resolve(method, task, profile).run.steps:,}" for profile in BUILT_IN)] for task in built_in("tasks")
+    ]
+    return markdown(["task", *(f"`{profile}`" for profile in BUILT_IN)], rows)
+
+
 def _search(results: Path) -> str:
     """Return what the common search found for every method, one line each."""
     table = pd.read_csv(results / TABLE_FILE)
@@ -180,6 +193,7 @@ MAKERS: dict[str, Callable[[Path], str]] = {
     "response": _response,
     "search": _search,
     "leaderboard": lambda folder: leaderboard(folder, "../results/submissions"),
+    "budgets": lambda _: _budgets(),
     "claims": lambda results: by_rule(_judged(results)),
     "contradicted": lambda results: contradicted(_judged(results)),
 }

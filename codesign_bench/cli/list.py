@@ -43,8 +43,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
         ("profiles", [(profile.name, profile.help) for profile in profiles().values()]),
     ):
         log(title)
+        width = max(len(name) for name, _ in entries)
         for name, text in entries:
-            log(f"  {name:8} {text}")
+            log(f"  {name:{width}} {text}")
     return 0
 
 

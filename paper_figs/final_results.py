@@ -124,13 +124,14 @@ def draw(frame: pd.DataFrame) -> Figure:
     columns = min(len(tasks), PANELS_PER_ROW)
     rows = math.ceil(len(tasks) / columns)
     most = int(table.groupby("task").size().max())
+    colours = {name: colour for name, (colour, _) in line_styles(table["method"]).items()}  # the same in every panel
     with style():
         figure = Figure(figsize=(PAGE_WIDTH, rows * (ROW_HEIGHT * most + 0.5) + 0.3), layout="constrained")
         axes = figure.subplots(rows, columns, squeeze=False)
         for axis, task in zip(axes.flat, tasks, strict=False):
             own = table[table["task"] == task]
             seeds = [_ended(finals, task, method)["success_rate"].tolist() for method in own["method"]]
-            _draw_panel(axis, own, seeds, str(task).replace("_", " "))
+            _draw_panel(axis, own, seeds, colours, str(task).replace("_", " "))
         for axis in axes.flat[len(tasks) :]:
             axis.set_visible(False)
         figure.supxlabel(INTERVAL, fontsize=6)
@@ -232,11 +233,12 @@ def _ended(table: pd.DataFrame, task: str, method: str) -> pd.DataFrame:
     return own[own["env_steps"] >= FARTHEST_SHARE * own["env_steps"].max()]
 
 
-def _draw_panel(axes: Axes, table: pd.DataFrame, seeds: Sequence[Sequence[float]], title: str) -> None:
+def _draw_panel(
+    axes: Axes, table: pd.DataFrame, seeds: Sequence[Sequence[float]], colours: Mapping[str, str], title: str
+) -> None:
     """Draw one task: for each row of the table a line with its interval, its mean and each of its seeds."""
-    styles = line_styles(table["method"])
     for place, row in enumerate(table.to_dict("records")):
-        colour, _ = styles[str(row["method"])]
+        colour = colours[str(row["method"])]
         axes.plot([row["success_rate_low"], row["success_rate_high"]], [place, place], color=colour, linewidth=2.0)
         axes.plot(seeds[place], [place] * len(seeds[place]), zorder=3, **SEED_DOTS)
         axes.plot([row["success_rate"]], [place], "o", color=colour, markersize=4.0, gid=str(row["method"]))

@@ -94,6 +94,14 @@ def test_the_picture_shows_the_table() -> None:
     assert [text.get_text() for text in drawn["push"].get_yticklabels()] == ["gnn_ppo (3)", "cma_rl (3)"]
 
 
+def test_a_method_has_one_colour_whatever_else_a_panel_shows() -> None:
+    frame = pd.concat([cells("zeta", [5.0]), cells("alpha", [2.0]), cells("zeta", [8.0], task="scoop")])
+    dots = [line for axes in figure.draw(frame).axes if axes.get_visible() for line in axes.lines if line.get_gid()]
+    colours = {(line.get_gid(), line.get_color()) for line in dots}
+    assert len(dots) == 3
+    assert len(colours) == len({colour for _, colour in colours}) == 2
+
+
 def test_the_same_results_give_the_same_intervals() -> None:
     frame = cells("gnn_ppo", [1.0, 2.0, 6.0])
     pd.testing.assert_frame_equal(figure.data(frame), figure.data(frame))

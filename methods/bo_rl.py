@@ -127,7 +127,8 @@ class BoRl(GivenDesignMethod[Config]):
             if self._judged_now:
                 self._judge(batch, remaining_steps - report.env_steps)
             else:
-                self._left -= report.env_steps
+                # Whole episodes may pass the share. The candidate is then judged by the shortest batch that there is.
+                self._left = max(1, self._left - report.env_steps)
         logged = {"candidates": float(len(self.scores))}
         if self.scores:
             logged |= {"candidate_score": self.scores[-1], "best_score": max(self.scores)}

@@ -54,7 +54,7 @@ BUILT_IN: Mapping[str, Profile] = {
         ),
         Profile(
             "workstation",
-            "for conclusions: the settings of `laptop`, and longer budgets, so that curves hardly rise at the end",
+            "meant for conclusions: the settings of `laptop`, and longer budgets (estimates so far: docs/budgets.md)",
             sourced({"steps": 3_000_000, "evaluations": 30}, "ours"),
         ),
     )

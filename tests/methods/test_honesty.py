@@ -298,6 +298,18 @@ def test_each_candidate_gets_a_new_controller_and_the_best_one_is_kept(push: Tas
         assert better != all(np.array_equal(before[name], after[name]) for name in before)
 
 
+@pytest.mark.parametrize("more", (1, 4, 7))
+def test_a_batch_that_passes_a_candidates_share_leaves_the_candidate_to_be_judged(
+    make_method: MakeMethod, more: int
+) -> None:
+    share = 600 + more  # The first batch of 600 is not the judging one, and its whole episodes may pass the share.
+    method: Any = make_method("bo_rl", candidates=2, search_share=1.0, batch_size=600)
+    left = 2 * share
+    while left > 0 and method._searching:
+        left -= method.train(left).env_steps
+    assert len(method.scores) == 2
+
+
 def test_random_tools_are_drawn_anew_in_every_episode_and_the_middle_one_is_used(push: Task) -> None:
     method_class = load_method("random_tool")
     method = method_class(Problem(push), replace(method_class.config_class(), **method_class.small()), Streams(0))

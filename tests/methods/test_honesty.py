@@ -298,7 +298,7 @@ def test_each_candidate_gets_a_new_controller_and_the_best_one_is_kept(push: Tas
         assert better != all(np.array_equal(before[name], after[name]) for name in before)
 
 
-@pytest.mark.parametrize("more", (1, 4, 7))
+@pytest.mark.parametrize("more", [1, 4, 7])
 def test_a_batch_that_passes_a_candidates_share_leaves_the_candidate_to_be_judged(
     make_method: MakeMethod, more: int
 ) -> None:

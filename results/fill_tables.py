@@ -31,6 +31,7 @@ from codesign_bench.storage.reference_points import FILE, POINTS, load_reference
 from codesign_bench.study import DEFAULT_STUDY, load_study
 from codesign_bench.text_tables import markdown
 from codesign_bench.tuning.results import TABLE_FILE
+from codesign_bench.tuning.scores import mean_ranks
 
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "results" / "reference"
@@ -155,8 +156,9 @@ def _search(results: Path) -> str:
     for method in in_order("methods", table["method"].unique()):
         own = table[table["method"] == method]
         returns = own.pivot(index="task", columns="setting", values="validation_return")
-        ranks = returns.rank(axis="columns", ascending=False).mean()
-        present, best = returns.columns[0], ranks.iloc[1:].idxmin()
+        ranks = mean_ranks(returns)
+        present, *changes = ranks
+        best = min(changes, key=ranks.__getitem__)
         ahead = int((returns[best] > returns[present]).sum())
         (kept,) = own.loc[own["kept"] == 1, "setting"].unique()
         lines.append(

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan, nan
 from pathlib import Path
-from statistics import fmean
 
-from scipy.stats import rankdata
+import pandas as pd
 
 from codesign_bench.cell.cell import Cell
 from codesign_bench.storage.cells import StoredCell
@@ -69,21 +68,31 @@ def pooled(scores: Sequence[Score], count: int) -> list[Score]:
     """Return the scores of the `count` best settings of every method over all tasks, in the given order.
 
     Settings of one method with the same number are one change on all tasks. Their returns differ in scale between
-    tasks, so their ranks are averaged; equal returns share their rank, and of equal means the first setting is better.
-    A setting with a failed cell is left out everywhere.
+    tasks, so their ranks are averaged; of equal means the first setting is better. A setting with a failed cell is left
+    out everywhere.
     """
     chosen: set[tuple[str, int]] = set()
     for method in dict.fromkeys(found.setting.method for found in scores):
         of_method = [found for found in scores if found.setting.method == method]
         failed = {found.setting.number for found in of_method if found.failed}
-        ranks: dict[int, list[float]] = {}
-        for task in dict.fromkeys(found.setting.task for found in of_method):
-            here = [found for found in of_method if found.setting.task == task and found.setting.number not in failed]
-            for found, rank in zip(here, rankdata([-found.validation_return for found in here]), strict=True):
-                ranks.setdefault(found.setting.number, []).append(float(rank))
-        order = sorted(ranks, key=lambda number: (fmean(ranks[number]), number))
-        chosen |= {(method, number) for number in order[:count]}
+        returns: dict[int, dict[str, float]] = {}
+        for found in of_method:
+            if found.setting.number not in failed:
+                returns.setdefault(found.setting.number, {})[found.setting.task] = found.validation_return
+        ranks = mean_ranks(pd.DataFrame(returns))
+        order = sorted(ranks.items(), key=lambda place: (place[1], place[0]))
+        chosen |= {(method, number) for number, _ in order[:count]}
     return [found for found in scores if (found.setting.method, found.setting.number) in chosen]
+
+
+def mean_ranks(returns: pd.DataFrame) -> dict[int, float]:
+    """Return each setting's rank averaged over tasks; the highest return is 1, equal ones share their mean rank.
+
+    Args:
+        returns: a row for every task and a column for every setting, by its number.
+    """
+    ranks = returns.rank(axis="columns", ascending=False).mean()
+    return {int(number): rank for number, rank in zip(returns.columns, ranks.tolist(), strict=True)}
 
 
 def confirmed(winners: Sequence[Score], scores: Sequence[Score], ahead_on: int) -> list[Score]:

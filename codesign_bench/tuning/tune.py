@@ -117,9 +117,7 @@ def tune(
         cells = [setting.cells(tuning, rung, profile, budgets[setting.task][rung]) for setting in alive]
         code = max(code, sweep(resolve_cells(cells_in_turn(cells))))
         found = [score(setting, rung, part, out) for setting, part in zip(alive, cells, strict=True)]
-        winners = (pooled if tuning.pooled else survivors)(found, following)
-        if tuning.ahead_on and rung + 1 == tuning.rungs:
-            winners = confirmed(winners, found, tuning.ahead_on)
+        winners = _choose(tuning, rung, found, following)
         alive = [winner.setting for winner in winners]
         scores += found
         kept += winners
@@ -127,6 +125,14 @@ def tune(
     write_winners(out, {"study": study, "profile": profile}, tuning, scores, winners)
     conclude(log, out, profile, winners, scores)
     return code
+
+
+def _choose(tuning: Tuning, rung: int, found: Sequence[Score], count: int) -> list[Score]:
+    """Return the scores of a rung whose settings go on, `count` of every method; after the last rung, the winners."""
+    chosen = (pooled if tuning.pooled else survivors)(found, count)
+    if tuning.ahead_on and rung + 1 == tuning.rungs:
+        return confirmed(chosen, found, tuning.ahead_on)
+    return chosen
 
 
 def conclude(log: Log, out: Path, profile: str, chosen: list[Score], scores: list[Score]) -> None:

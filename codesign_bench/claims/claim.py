@@ -46,3 +46,6 @@ class Claim:
     """Tasks of the claim; without results of all of them, the claim is not asked."""
     check_of_scene: bool = False
     """Whether the scene was chosen so that the claim holds; the claim then checks the scene and is no discovery."""
+    looks: int = 1
+    """How many times it may be judged while seeds are added. The p-value counts as often (Bonferroni): one that is
+    read at every look falls below a level by luck more often than one that is read once."""

@@ -38,7 +38,8 @@ class Finding:
     p: float = math.nan
     """Two-sided p-value of this claim only; NaN for rules without a test."""
     p_adjusted: float = math.nan
-    """Adjusted by Holm's method for all claims of the same kind of rule; set when the claims are judged together."""
+    """Adjusted for the claim's looks, then by Holm's method for all claims of the same kind of rule; set when the
+    claims are judged together."""
     family_size: int = 0
     """Number of claims in that adjustment."""
 
@@ -47,12 +48,13 @@ class Finding:
         """Whether the claim is supported or contradicted."""
         return self.verdict in (SUPPORTED, CONTRADICTED)
 
-    def adjusted(self, p_adjusted: float, family_size: int) -> Finding:
+    def adjusted(self, p_adjusted: float, family_size: int, looks: int = 1) -> Finding:
         """Return the finding as one of a family: undecided if the adjusted p-value is not below `LEVEL`."""
         known = replace(self, p_adjusted=p_adjusted, family_size=family_size)
         if not self.is_directional or p_adjusted < LEVEL:
             return known
-        why = f"p is {probability(p_adjusted)} after adjustment for {family_size} claims"
+        each = f", each judged up to {looks} times" if looks > 1 else ""
+        why = f"p is {probability(p_adjusted)} after adjustment for {family_size} claims{each}"
         return replace(known, verdict=UNDECIDED, note=joined(self.note, why))
 
 

@@ -103,16 +103,18 @@ def judge(claims: Sequence[Claim], evidence: Evidence, results: str) -> list[Row
 
 
 def adjusted(rows: Sequence[Row]) -> list[Row]:
-    """Return the rows with p-values adjusted for all claims with the same kind of rule."""
+    """Return the rows with p-values adjusted for each claim's looks and all claims with the same kind of rule."""
     families = defaultdict(list)
     for index, row in enumerate(rows):
         if not math.isnan(row.finding.p):
             families[row.claim.rule.kind].append(index)
     result = list(rows)
     for family in families.values():
-        adjusted_p = stats.holm([rows[index].finding.p for index in family])
+        # Whichever look ends a claim, its p-value times the looks is valid, and Holm's method needs no more than that.
+        adjusted_p = stats.holm([rows[index].claim.looks * rows[index].finding.p for index in family])
         for index, p in zip(family, adjusted_p, strict=True):
-            result[index] = replace(rows[index], finding=rows[index].finding.adjusted(float(p), len(family)))
+            finding = rows[index].finding.adjusted(float(p), len(family), rows[index].claim.looks)
+            result[index] = replace(rows[index], finding=finding)
     return result
 
 
@@ -262,6 +264,7 @@ def _entry(row: Row) -> dict[str, Any]:
         "rule": row.claim.rule.kind,
         "statistic": row.claim.rule.statistic,
         "words": row.claim.rule.words,
+        "looks": row.claim.looks,
         "verdict": row.finding.verdict,
         "value": _json_number(row.finding.value),
         "low": _json_number(row.finding.low),
@@ -307,9 +310,10 @@ def as_markdown(
 
 
 HOW_SURE = (
-    "p-values are two-sided. The adjusted ones account by Holm's method for all claims of the same rule, whose number "
-    f"is in brackets; a verdict that follows from a test needs one below {LEVEL:g}. Fewer than {stats.MIN_SEEDS} seeds "
-    "give no interval and decide nothing."
+    "p-values are two-sided. The adjusted ones count each p-value as often as its claim may be judged while seeds are "
+    "added, and account by Holm's method for all claims of the same rule, whose number is in brackets; a verdict that "
+    f"follows from a test needs one below {LEVEL:g}. Fewer than {stats.MIN_SEEDS} seeds give no interval and decide "
+    "nothing."
 )
 SCENES = (
     "The scenes were chosen so that one tool does not serve all goals. That no single tool does, and that methods with "

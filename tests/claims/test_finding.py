@@ -50,6 +50,8 @@ def test_a_family_may_take_a_verdict_back() -> None:
     assert (lost.verdict, lost.p_adjusted, lost.family_size) == (UNDECIDED, 0.06, 2)
     assert lost.note == "so be it; p is 0.060 after adjustment for 2 claims"
     assert Finding(UNDECIDED, 1.0, p=0.5).adjusted(1.0, 2).note == ""
+    twice = alone.adjusted(0.06, 3, looks=2)
+    assert twice.note == "so be it; p is 0.060 after adjustment for 3 claims, each judged up to 2 times"
     assert Finding(CONTRADICTED, -1.0, p=0.05).adjusted(0.05, 1).verdict == UNDECIDED, "0.05 is not below 0.05"
 
 

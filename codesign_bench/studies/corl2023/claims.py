@@ -28,6 +28,9 @@ LIFT = "lift_cup"
 CATCH = "catch_balls"
 FRACTIONS, ALPHAS = PROTOCOL.cutout_fractions, PROTOCOL.alphas
 FEW_SEEDS = PROTOCOL.seeds_generalisation
+LOOKS = 2
+"""Comparisons of methods are judged with a first set of seeds and, where that leaves them undecided, once more with
+additional ones (ours)."""
 TOOLS_ON_THE_ARM = len(REAL_ROBOT.fetch_cube_starts)
 
 
@@ -59,6 +62,7 @@ def _against(baseline: str, final: str, faster: str) -> Iterator[Claim]:
         comparison.ahead_across_tasks(TASKS, OURS, baseline, tuple(ALL_METHODS.values())),
         TASKS,
         check_of_scene=one_tool,
+        looks=LOOKS,
     )
     for task in TASKS:
         yield Claim(
@@ -68,6 +72,7 @@ def _against(baseline: str, final: str, faster: str) -> Iterator[Claim]:
             comparison.final_return_above(task, OURS, baseline, (ALL_METHODS[task],)),
             (task,),
             check_of_scene=one_tool,
+            looks=LOOKS,
         )
     for task in TASKS:
         yield Claim(
@@ -77,6 +82,7 @@ def _against(baseline: str, final: str, faster: str) -> Iterator[Claim]:
             comparison.sooner(task, OURS, baseline, (ALL_METHODS[task],)),
             (task,),
             check_of_scene=one_tool,
+            looks=LOOKS,
         )
 
 

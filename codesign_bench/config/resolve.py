@@ -70,39 +70,25 @@ def resolve(
         UserError: an unknown task or profile, a value of the wrong type or out of range, or one that does not fit the
             task.
     """
-    chosen = profile_named(profile)
-    of_task = sourced(load_task(task_name, plays=False).run_settings.get(profile, {}), f"tuned for {task_name} (ours)")
-    run_values, run_sources = _start(RunSettings, {**chosen.run, **of_task})
-    method_values, method_sources = _start(
-        method_class.config_class,
-        {
-            **{name: Sourced(*entry) for name, entry in method_class.profile(profile, task_name).items()},
-            **chosen.hyperparameters(method_class.name, task_name),
-        },
-    )
-    complete = _build(method_class.config_class, method_values)
-    for name, (value, source) in method_class.derived(complete, profile, task_name).items():
-        method_values[name], method_sources[name] = value, source
+    run, method = _of_profile(method_class, task_name, profile)
     if steps is not None:
-        run_values["steps"], run_sources["steps"] = steps, "--steps"
+        run["steps"] = Sourced(steps, "--steps")
     for source, override in [
         *(("--set", text) for text in overrides),
         *(("variant", text) for text in variant_overrides),
     ]:
         prefix, key, text = split_override(override)
-        if prefix in (None, RUN) and key in run_values:
-            run_values[key], run_sources[key] = _parse_field(RunSettings, key, text), source
-        elif prefix in (None, method_class.name) and key in method_values:
-            method_values[key], method_sources[key] = _parse_field(method_class.config_class, key, text), source
-    method = _build(method_class.config_class, method_values)
-    method_class.check(method, task_name)
+        if prefix in (None, RUN) and key in run:
+            run[key] = Sourced(_parse_field(RunSettings, key, text), source)
+        elif prefix in (None, method_class.name) and key in method:
+            method[key] = Sourced(_parse_field(method_class.config_class, key, text), source)
+    config = _build(method_class.config_class, method)
+    method_class.check(config, task_name)
+    parts = {RUN: run, METHOD: method}
     return ResolvedConfig(
-        run=_build(RunSettings, run_values),
-        method=method,
-        sources={
-            **{f"{RUN}.{name}": source for name, source in run_sources.items()},
-            **{f"{METHOD}.{name}": source for name, source in method_sources.items()},
-        },
+        run=_build(RunSettings, run),
+        method=config,
+        sources={f"{part}.{name}": entry.source for part, values in parts.items() for name, entry in values.items()},
     )
 
 
@@ -175,21 +161,36 @@ def differences(stored: StoredConfig, resolved: ResolvedConfig) -> list[str]:
     return found
 
 
-def _start(config_class: type, profile: Settings) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return the defaults of a dataclass, overridden by a profile, and every value's source."""
+def _of_profile(
+    method_class: type[Method[Any]], task_name: str, profile: str
+) -> tuple[dict[str, Sourced], dict[str, Sourced]]:
+    """Return the run settings and the method's, each with its source, of a profile without any overrides."""
+    chosen, config_class = profile_named(profile), method_class.config_class
+    of_task = sourced(load_task(task_name, plays=False).run_settings.get(profile, {}), f"tuned for {task_name} (ours)")
+    of_method = {name: Sourced(*entry) for name, entry in method_class.profile(profile, task_name).items()}
+    method = _start(config_class, {**of_method, **chosen.hyperparameters(method_class.name, task_name)})
+    derived = method_class.derived(_build(config_class, method), profile, task_name)
+    method |= {name: Sourced(*entry) for name, entry in derived.items()}
+    return _start(RunSettings, {**chosen.run, **of_task}), method
+
+
+def _start(config_class: type, profile: Settings) -> dict[str, Sourced]:
+    """Return the defaults of a dataclass, overridden by a profile."""
     defaults = config_class()
-    values = {field.name: getattr(defaults, field.name) for field in fields(defaults)}
-    sources = {field.name: str(field.metadata.get("source", "default")) for field in fields(defaults)}
-    for name, (value, source) in profile.items():
+    values = {
+        field.name: Sourced(getattr(defaults, field.name), str(field.metadata.get("source", "default")))
+        for field in fields(defaults)
+    }
+    for name, entry in profile.items():
         if name not in values:
             raise TypeError(f"a profile sets '{name}', which {config_class.__qualname__} does not have")
-        values[name], sources[name] = value, source
-    return values, sources
+        values[name] = entry
+    return values
 
 
-def _build(config_class: type, values: Mapping[str, Any]) -> Any:
+def _build(config_class: type, values: Settings) -> Any:
     try:
-        config = config_class(**values)
+        config = config_class(**{name: entry.value for name, entry in values.items()})
         check_values(config)
     except ValueError as error:
         raise UserError(f"bad configuration: {error}") from error

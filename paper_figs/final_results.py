@@ -1,10 +1,10 @@
 """Final return and success of every method on every task, with intervals over seeds: the benchmark's table (ours).
 
-Numbers are means over seeds of the last evaluation of each; seeds that stopped early are left out. The normalised
-score is 0 for a random tool held still and 1 for the best known (`docs/reference_points.md`); only this score is
-averaged over tasks. Minutes are the median over cells as they ran, in parallel with others. The time of a cell that
-shared its core says nothing about the method. The late gain is how much the mean curve still rose over the last third
-of its steps, in normalised score: near 0, the budget was long enough.
+Numbers are means over seeds of the last evaluation of each; cells that are not finished, and seeds that stopped early,
+are left out. The normalised score is 0 for a random tool held still and 1 for the best known
+(`docs/reference_points.md`); only this score is averaged over tasks. Minutes are the median over cells as they ran, in
+parallel with others. The time of a cell that shared its core says nothing about the method. The late gain is how much
+the mean curve still rose over the last third of its steps, in normalised score: near 0, the budget was long enough.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from codesign_bench.figures.source import curves_with_references
+from codesign_bench.figures.source import final_curves
 from codesign_bench.stats import (
     CONFIDENCE,
     MIN_SEEDS,
@@ -35,7 +35,7 @@ from ._order import task_order
 from ._style import PAGE_WIDTH, SEED_DOTS, in_order, line_styles, style
 
 TITLE = "Final results"
-SOURCE = curves_with_references
+SOURCE = final_curves
 NEEDS = "codesign-bench run --method all --task T --seeds 6"
 ROW_HEIGHT = 0.17
 """Height of a method in a panel, in inches."""

@@ -23,6 +23,7 @@ from codesign_bench.evaluation.sensitivity import load_sensitivity
 from codesign_bench.stats import CELL_KEYS, MIN_SEEDS
 from codesign_bench.storage.cells import reported_cells
 from codesign_bench.storage.frames import load_evaluations, stored_curves
+from codesign_bench.storage.layout import first_run
 from codesign_bench.storage.reference_points import load_reference_points
 from codesign_bench.task import load_task, task_names, usable_tasks
 
@@ -143,7 +144,7 @@ def load_evidence(results: Path) -> Evidence:
     points = _read(load_reference_points, results)
     references = _of_versions(points, {(record.task, record.task_version) for record in records})
     if evaluations.empty and sensitivity.empty:
-        raise UserError(f"no finished cell in '{results}' yet; create some with: codesign-bench run --out {results}")
+        raise UserError(f"no finished cell in '{results}' yet; create some with: {first_run(results)}")
     profile = profiles.pop() if len(profiles) == 1 else DEFAULT_PROFILE
     widths = _design_widths(evaluations)
     return Evidence(curves, evaluations, sensitivity, outside, regions, deployment, widths, profile, references)

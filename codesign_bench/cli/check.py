@@ -23,7 +23,7 @@ PASSED, LEFT_OUT, WRONG = "passed", "left out", "wrong"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to check, and the task on which methods are examined."""
-    parser.add_argument("--task", nargs="+", default=[], metavar="T", help="names that `list` shows, or all")
+    parser.add_argument("--task", nargs="+", default=[], metavar="T", help="names that `list` shows, all or beyond")
     parser.add_argument("--method", nargs="+", default=[], metavar="M", help="names that `list` shows, all or beyond")
     parser.add_argument(
         "--on", metavar="T", help="task on which methods are examined; default: the first that `list` shows"

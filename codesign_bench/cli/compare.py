@@ -6,7 +6,7 @@ import argparse
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import path
+from codesign_bench.cli.arguments import ALL, path
 from codesign_bench.console import print_table, printer, tell_left_out
 from codesign_bench.storage.places import KINDS, results_folder
 
@@ -34,7 +34,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     first, second = (results_folder(given, must_exist=True) for given in (options.a, options.b))
     for folder in dict.fromkeys((first, second)):
         tell_left_out(lines(folder, survey(folder)))
-    found = compare(first, second, methods=options.method, variants=options.variants)
+    found = compare(
+        first, second, methods=None if options.method == [ALL] else options.method, variants=options.variants
+    )
     print_table(console, HEADER, rows_of(found))
     log = printer(console)
     for line in notes(found):

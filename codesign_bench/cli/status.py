@@ -17,6 +17,7 @@ from codesign_bench.config.values import Within
 from codesign_bench.console import JsonLines, print_table, printer, tell_left_out
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import scan
+from codesign_bench.storage.layout import first_run
 from codesign_bench.storage.places import results_folder
 from codesign_bench.storage.records import RUNNING
 from codesign_bench.storage.status import status_event, status_row
@@ -90,7 +91,7 @@ def print_status(console: Console, out: Path, *, clear: bool = False) -> int:
         console.clear()
     tell_left_out(left_out)
     if not cells:
-        raise UserError(f"no cells in '{out}' yet; run some with: codesign-bench run --out {out}")
+        raise UserError(f"no cells in '{out}' yet; run some with: {first_run(out)}")
     counts = Counter(cell.status for cell in cells)
     if isinstance(console, JsonLines):
         for cell in cells:

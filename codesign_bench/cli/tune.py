@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import signal
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
 
 from codesign_bench.cli.arguments import (
     ALL,
+    BEYOND,
     OfKind,
     add_dry_run,
     add_jobs,
@@ -20,6 +22,7 @@ from codesign_bench.cli.arguments import (
     add_sweep,
     add_tensorboard,
     chosen_names,
+    groups,
     out_folder,
 )
 from codesign_bench.config.run_settings import Steps
@@ -35,7 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the study, the budget, the output folder, and how to run the cells; the size of the search is the study's."""
     add_study(parser)
     add_profile(parser)
-    parser.add_argument("--task", nargs="+", default=[ALL], metavar="T", help="some of the search, or all (default)")
+    parser.add_argument(
+        "--task", nargs="+", default=[ALL], metavar="T", help="some of the search, beyond, or all of it (default)"
+    )
     parser.add_argument("--method", nargs="+", default=[ALL], metavar="M", help="the same for methods")
     parser.add_argument(
         "--steps", type=OfKind(Steps), metavar="N", help="budget of a cell in the last rung (default: the profile's)"
@@ -59,8 +64,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
     study = load_study(options.study)
     whole = tuning_of(study)
-    tasks = chosen_names("tasks", options.task, {ALL: whole.tasks})
-    methods = chosen_names("methods", options.method, {ALL: whole.methods})
+    tasks = chosen_names("tasks", options.task, _groups_in("tasks", whole.tasks))
+    methods = chosen_names("methods", options.method, _groups_in("methods", whole.methods))
     tuning = usable_part(part_of(whole, tasks, methods), printer(console))
     if options.plan:
         print_plan(console, tuning, options.profile, options.steps)
@@ -83,3 +88,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         same_code=options.same_code,
         tensorboard=options.tensorboard,
     )
+
+
+def _groups_in(group: str, searched: Sequence[str]) -> dict[str, Sequence[str]]:
+    """Return what `all` and `beyond` stand for in a search: all of it, and what of it the paper does not have."""
+    return {ALL: searched, BEYOND: [name for name in groups(group)[BEYOND] if name in searched]}

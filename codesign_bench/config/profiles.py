@@ -49,7 +49,7 @@ BUILT_IN: Mapping[str, Profile] = {
         ),
         Profile(
             "laptop",
-            "under an hour per 2D task on two cores (default)",
+            "an hour or two per 2D task on two cores (default)",
             sourced({"steps": 1_000_000, "evaluations": 20}, "ours"),
         ),
         Profile(

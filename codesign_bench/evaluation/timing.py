@@ -15,6 +15,7 @@ from codesign_bench.cell.variant import DEFAULT
 from codesign_bench.console import Log, silent
 from codesign_bench.errors import UserError
 from codesign_bench.storage.cells import StoredCell, reported_cells
+from codesign_bench.storage.layout import first_run
 from codesign_bench.storage.policies import misfit, policy_of
 from codesign_bench.task import load_task, task_names, usable_tasks
 from codesign_bench.task.episodes import Episodes
@@ -67,7 +68,7 @@ def timing_frame(results: Path, log: Log = silent) -> pd.DataFrame:
             }
         )
     if not rows:
-        raise UserError(f"no finished cell in '{results}' yet; create some with: codesign-bench run --out {results}")
+        raise UserError(f"no finished cell in '{results}' yet; create some with: {first_run(results)}")
     return pd.DataFrame(rows)
 
 

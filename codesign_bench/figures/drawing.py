@@ -25,6 +25,7 @@ from codesign_bench.figures.source import Request, Source, curves
 from codesign_bench.registry import built_in, load_all, load_module, names, usable_modules
 from codesign_bench.storage.files import Outputs, make_folder, removed_if_refused
 from codesign_bench.storage.frames import stored_curves
+from codesign_bench.storage.layout import first_run
 from codesign_bench.storage.tables import csv_bytes
 from codesign_bench.study.study import DEFAULT_STUDY, Study, load_study
 from codesign_bench.visible_text import in_figure
@@ -78,7 +79,7 @@ def draw_figures(
         choices = [name for name, module in known.items() if getattr(module, "COMPARES", False)]
         raise UserError(f"--compare: {', '.join(wanted)} show no curves; choose from: {', '.join(choices)}")
     if not wanted and not results.is_dir():
-        raise UserError(f"no results folder '{results}'; create one with: codesign-bench run --out {results}")
+        raise UserError(f"no results folder '{results}'; create one with: {first_run(results)}")
     if compare is not None:
         stored_curves(compare)  # a wrong folder is an error, not a reason to leave the curves out
     drawn: list[Path] = []

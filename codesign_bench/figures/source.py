@@ -58,6 +58,11 @@ def curves_with_references(request: Request) -> pd.DataFrame:
     return with_reference_points(stored_curves(request.results), request.results)
 
 
+def final_curves(request: Request) -> pd.DataFrame:
+    """Return the same of finished cells alone, for figures about the end of training."""
+    return with_reference_points(stored_curves(request.results, finished=True), request.results)
+
+
 def evaluations(request: Request) -> pd.DataFrame:
     """Return the final result of every finished cell on each evaluation instance."""
     return load_evaluations(request.results)

@@ -12,6 +12,7 @@ from codesign_bench.console import duration
 from codesign_bench.errors import UserError
 from codesign_bench.registry import in_order
 from codesign_bench.storage.cells import scan
+from codesign_bench.storage.layout import first_run
 from codesign_bench.storage.places import shown
 from codesign_bench.storage.records import CellRecord, Timings
 from codesign_bench.storage.status import status_row
@@ -72,7 +73,7 @@ def read_cells(results: Path) -> tuple[list[PageCell], list[str]]:
         if cell.is_reported
     ]
     if not cells:
-        raise UserError(f"no cells in '{results}' yet; create some with: codesign-bench run --out {results}")
+        raise UserError(f"no cells in '{results}' yet; create some with: {first_run(results)}")
     return cells, lines(results, survey(results, contents))
 
 

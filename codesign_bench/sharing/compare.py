@@ -81,6 +81,7 @@ def compare(first: Path, second: Path, methods: Sequence[str] | None = None, var
         [found for found in finals_of(folder) if variants or found.variant == DEFAULT_NAME]
         for folder in (first, second)
     )
+    everything = [(first, of_a), (second, of_b)]
     if methods is not None:
         of_a, of_b = (
             [found for found in side if found.method == method]
@@ -88,7 +89,7 @@ def compare(first: Path, second: Path, methods: Sequence[str] | None = None, var
         )
     pairs = [(one, two) for one in of_a for two in of_b if _alike(one, two, same_method=methods is None)]
     if not pairs:
-        raise UserError(_nothing_common([(first, of_a), (second, of_b)], variants))
+        raise UserError(_nothing_common(everything, variants))
     scales = common_scales(stored_references(first), stored_references(second))
     singles = [_single(pair, scales) for pair in pairs]
     matched = {id(found) for pair in pairs for found in pair}

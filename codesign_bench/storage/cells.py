@@ -16,7 +16,14 @@ from codesign_bench.cell.cell import Cell
 from codesign_bench.config.run_settings import EVALUATION
 from codesign_bench.errors import UserError
 from codesign_bench.storage.files import reason_of
-from codesign_bench.storage.layout import CURVE_COLUMNS, CURVE_FILE, EVALUATION_FILE, METRICS_FILE, POLICY_FILE
+from codesign_bench.storage.layout import (
+    CURVE_COLUMNS,
+    CURVE_FILE,
+    EVALUATION_FILE,
+    METRICS_FILE,
+    POLICY_FILE,
+    first_run,
+)
 from codesign_bench.storage.locks import is_locked
 from codesign_bench.storage.places import cell_folder
 from codesign_bench.storage.reading import DamagedFile, UnreadableFile, UnusableFile, is_folder, is_there, read_bytes
@@ -203,7 +210,7 @@ def scan(out: Path) -> Contents:
         UserError: the folder does not exist.
     """
     if not is_folder(out):
-        raise UserError(f"no results folder '{out}'; create it with: codesign-bench run --out {out}")
+        raise UserError(f"no results folder '{out}'; create it with: {first_run(out)}")
     contents = Contents([], [])
     for folder in _at_depth(out, DEPTH, contents.unusable):
         try:

@@ -13,6 +13,7 @@ from codesign_bench.config.values import plain_type
 from codesign_bench.errors import UserError
 from codesign_bench.stats.normalization import normalized_score
 from codesign_bench.storage.cells import StoredCell, reported_cells
+from codesign_bench.storage.layout import first_run
 from codesign_bench.storage.places import results_folder
 from codesign_bench.storage.reading import UnusableFile
 from codesign_bench.storage.reference_points import stored_references
@@ -54,17 +55,22 @@ def load_results(out: str | Path) -> pd.DataFrame:
     return stored_curves(folder)
 
 
-def stored_curves(out: str | Path) -> pd.DataFrame:
+def stored_curves(out: str | Path, *, finished: bool = False) -> pd.DataFrame:
     """Return the frame of `load_results`; its callers say themselves what is left out.
+
+    Args:
+        out: the results folder.
+        finished: whether cells are left out that are running, interrupted or failed.
 
     Raises:
         UserError: the folder does not exist or contains no results.
     """
     import pandas as pd
 
-    parts = _tables_of(reported_cells(Path(out)), StoredCell.curve)
+    parts = _tables_of((cell for cell in reported_cells(Path(out)) if cell.is_done or not finished), StoredCell.curve)
     if not parts:
-        raise UserError(f"no results in '{out}' yet; create some with: codesign-bench run --out {out}")
+        missing = "finished cell" if finished else "results"
+        raise UserError(f"no {missing} in '{out}' yet; create some with: {first_run(out)}")
     frame = pd.concat(_with_cell_columns(Path(out), parts, "return_mean"), ignore_index=True)
     return frame.astype({"seed": int, "env_steps": int})
 
@@ -84,7 +90,7 @@ def load_evaluations(out: str | Path) -> pd.DataFrame:
 
     parts = _tables_of((cell for cell in reported_cells(Path(out)) if cell.is_done), StoredCell.evaluation)
     if not parts:
-        raise UserError(f"no finished cell in '{out}' yet; create some with: codesign-bench run --out {out}")
+        raise UserError(f"no finished cell in '{out}' yet; create some with: {first_run(out)}")
     numbered = [(cell, _in_front({"instance": range(len(table))}, table)) for cell, table in parts]
     return pd.concat(_with_cell_columns(Path(out), numbered, "return"), ignore_index=True).astype({"seed": int})
 

@@ -64,6 +64,11 @@ def open_folder(out: Path) -> None:
         raise UserError(f"--out {out}: not writable ({error.strerror})") from error
 
 
+def first_run(out: str | Path) -> str:
+    """Return a command that writes first results into the folder `out`."""
+    return f"codesign-bench run --method all --task push --out {out}"
+
+
 def refuse_archive(out: Path) -> None:
     """Check that results may be written into a folder.
 

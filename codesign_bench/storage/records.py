@@ -20,7 +20,7 @@ CELL_FILE = "cell.json"
 SCHEMA = 2
 """Version 1 stored the first four axes of the variant as top-level entries, and no other axes."""
 
-RESTART = "delete its folder to restart the cell"
+RESTART = "if the file is yours, delete its folder to restart the cell"
 """Said only of a cell file whose content was read and is damaged."""
 
 FORMER_LABELS = {"GNN-PPO (paper's)": "GNN-PPO"}

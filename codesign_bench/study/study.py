@@ -66,13 +66,14 @@ class Study:
         Raises:
             UserError: an unknown name.
         """
-        if not wanted or ALL in wanted:
-            return dict(self.experiments)
         known = {figure: name for name, experiment in self.experiments.items() for figure in experiment.figures}
         known |= {name: name for name in self.experiments}
         for name in wanted:
-            if name not in known:
-                raise unknown_name("experiment", name, (*dict.fromkeys([*self.experiments, *self.figures]), ALL))
+            if name not in known and name != ALL:
+                choices = dict.fromkeys([*self.experiments, *self.figures])
+                raise unknown_name("figure", name, (*choices, ALL, "or those of another --study"))
+        if not wanted or ALL in wanted:
+            return dict(self.experiments)
         return {known[name]: self.experiments[known[name]] for name in wanted}
 
 

@@ -137,5 +137,5 @@ def _refuse_without_pretrained(cells: Sequence[Cell], out: Path, promised: Colle
                 raise UserError(
                     f"{cell.name} starts from {before.name}, which is not done in {out}\nfirst run: "
                     f"codesign-bench run --method {cell.method} --task {cell.task} --seeds {cell.seed}-{cell.seed} "
-                    f"--profile {cell.profile} --out {out}, with the same --set if any"
+                    f"--profile {cell.profile} --out {out}, with the same --steps and --set if any"
                 )

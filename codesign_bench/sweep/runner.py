@@ -304,8 +304,9 @@ def _conclude(say: Log, cells: int, trouble: Trouble, plan: Plan) -> int:
     if trouble.interrupted:
         say(f"{len(trouble.interrupted)} of {cells} cells interrupted; the same command resumes them")
     if trouble.failed:
-        advice = "cell.json has the traceback of each that began, and --retry-failed runs it again"
-        say(f"{len(trouble.failed)} of {cells} cells failed; {advice}")
+        began = set(trouble.failed) - set(plan.unusable)
+        advice = "; cell.json has the traceback of each that began, and --retry-failed runs it again" if began else ""
+        say(f"{len(trouble.failed)} of {cells} cells failed{advice}")
     if trouble.failed or trouble.interrupted:
         return EXIT_SOME_FAILED
     say(f"all {cells} cells done")

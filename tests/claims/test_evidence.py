@@ -122,5 +122,5 @@ def test_cells_of_several_profiles_are_asked_for_with_the_default_one(tmp_path: 
 
 def test_a_folder_in_which_nothing_is_finished_is_answered_with_the_command_that_makes_results(tmp_path: Path) -> None:
     make_cell(tmp_path, OURS, 0, 1.0, status=RUNNING)
-    with pytest.raises(UserError, match="create some with: codesign-bench run --out"):
+    with pytest.raises(UserError, match="create some with: codesign-bench run --method"):
         load_evidence(tmp_path)

@@ -20,6 +20,8 @@ def test_two_folders_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert header.split()[:2] == ["task", "method"]
     assert header.endswith("adjusted p")
     assert row.split()[:8] == ["push", "gnn_ppo", "3,", "3", "1.10", "0.10", "+1.00", "[+0.77,"]
+    assert main(["compare", str(tmp_path / "now"), str(tmp_path / "before"), "--method", "all"]) == 0
+    assert capsys.readouterr().out.splitlines() == [header, row, *notes]
     assert notes[-1].startswith("commits: ")
     assert "of now" in notes[-1]
 

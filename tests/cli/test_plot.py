@@ -58,4 +58,4 @@ def test_a_folder_that_is_not_there_is_an_error_whatever_is_drawn(
 
 def test_plotting_without_results_says_how_to_make_some(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plot", "--results", str(tmp_path / "none"), "--out", str(tmp_path / "figures")]) == 2
-    assert "codesign-bench run --out" in capsys.readouterr().err
+    assert "codesign-bench run --method" in capsys.readouterr().err

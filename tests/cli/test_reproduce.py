@@ -22,7 +22,7 @@ def test_an_experiment_without_cells_ends_well_in_an_empty_folder(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["figure_7"], "unknown experiment 'figure_7'; choose from: task_gallery"),
+        (["figure_7"], "unknown figure 'figure_7'; choose from: task_gallery"),
         (["tradeoff", "--profile", "slow"], "unknown profile 'slow'; choose from: quick, laptop, workstation, paper"),
         (["tradeoff", "--seeds", "0"], "--seeds: expected an integer from 1 to 10,000, not '0'"),
         (["tradeoff", "--study", "neurips"], "unknown study 'neurips'"),

@@ -36,6 +36,10 @@ def test_a_part_of_the_search_has_the_steps_of_the_whole_on_it(capsys: pytest.Ca
     assert "push 2 2 1,000,000 4,000,000" in printed
     assert "catch_balls" not in printed
     assert "the same for cma_rl, cma_es: 11,999,992 steps each" in printed
+    assert main(["tune", "--plan", "--study", "all_methods", "--task", "beyond", "--method", "cma_es", "pt_me"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "bounce 0 4" in printed
+    assert "push" not in printed
 
 
 @pytest.mark.parametrize(

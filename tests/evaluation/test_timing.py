@@ -58,5 +58,5 @@ def test_a_call_of_a_policy_takes_some_time(results: Path) -> None:
 
 def test_without_a_finished_cell_the_way_to_one_is_told(tmp_path: Path) -> None:
     store_cell(tmp_path, status=RUNNING)
-    with pytest.raises(UserError, match="create some with: codesign-bench run --out"):
+    with pytest.raises(UserError, match="create some with: codesign-bench run --method"):
         timing_frame(tmp_path)

@@ -16,6 +16,7 @@ from codesign_bench.figures.source import (
     design_sensitivity,
     design_values,
     evaluations,
+    final_curves,
     headroom,
     tasks_in,
     tasks_shown,
@@ -32,7 +33,14 @@ def test_curves_are_those_of_all_cells_and_evaluations_those_of_finished_ones(tm
     store_cell(tmp_path, curve=rising(0.0, 1.0), evaluation=[{"return": 1.0}, {"return": 3.0}])
     store_cell(tmp_path, seed=1, status=RUNNING, curve=rising(0.0, 5.0), evaluation=[{"return": 9.0}])
     assert curves(Request(tmp_path))["return_mean"].tolist() == [0.0, 1.0, 0.0, 5.0]
+    assert final_curves(Request(tmp_path))["return_mean"].tolist() == [0.0, 1.0]
     assert evaluations(Request(tmp_path))["return"].tolist() == [1.0, 3.0]
+
+
+def test_nothing_is_final_where_no_cell_is_finished(tmp_path: Path) -> None:
+    store_cell(tmp_path, status=RUNNING, curve=rising(0.0, 5.0))
+    with pytest.raises(UserError, match=r"no finished cell in .* create some with: codesign-bench run --method"):
+        final_curves(Request(tmp_path))
 
 
 def test_an_archive_is_never_measured_whatever_was_named(tmp_path: Path) -> None:

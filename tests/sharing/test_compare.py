@@ -94,6 +94,8 @@ def test_nothing_in_common_is_an_error_that_says_what_there_is(two: tuple[Path, 
     store_cell(tmp_path / "c", method="cma_rl")
     with pytest.raises(UserError, match=r"has cma_rl on push \(version 1\)"):
         compare(two[0], tmp_path / "c")
+    with pytest.raises(UserError, match=r"has cma_rl on push \(version 1\)"):
+        compare(tmp_path / "c", tmp_path / "c", methods=["no_such_method"])
     with pytest.raises(UserError, match="--method"):
         compare(*two, methods=["a", "b", "c"])
 

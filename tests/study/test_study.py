@@ -67,8 +67,11 @@ def test_experiments_are_named_by_themselves_and_by_their_figures(name: str) -> 
     for figure in study.figures:
         (experiment,) = study.experiments_named([figure]).values()
         assert figure in experiment.figures
-    with pytest.raises(UserError, match="unknown experiment 'figure_7'; choose from:"):
-        study.experiments_named(["figure_7"])
+    for wanted in (["figure_7"], ["all", "figure_7"]):
+        with pytest.raises(
+            UserError, match=r"unknown figure 'figure_7'; choose from: .*, all, or those of another --study"
+        ):
+            study.experiments_named(wanted)
 
 
 def test_an_unknown_study_lists_the_studies() -> None:

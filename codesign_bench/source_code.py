@@ -94,14 +94,17 @@ class SourceModule:
         return found[0] if found else None
 
     def stated(self, attribute: str) -> object:
-        """Return the literal that a class of the module assigns to `attribute`; None if none does."""
-        for part in self.tree.body:
-            for node in part.body if isinstance(part, ast.ClassDef) else []:
-                if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Constant):
-                    continue
-                if any(isinstance(target, ast.Name) and target.id == attribute for target in node.targets):
-                    return node.value.value
-        return None
+        """Return the literal that a class of the module, or one that it extends, assigns to `attribute`; else None."""
+        classes = [part for part in self.tree.body if isinstance(part, ast.ClassDef)]
+        for node in (node for part in classes for node in part.body):
+            if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Constant):
+                continue
+            if any(isinstance(target, ast.Name) and target.id == attribute for target in node.targets):
+                return node.value.value
+        bases = (base.value if isinstance(base, ast.Subscript) else base for part in classes for base in part.bases)
+        modules = (self.binding(base.id) for base in bases if isinstance(base, ast.Name))
+        found = (SourceModule(module).stated(attribute) for module in dict.fromkeys(modules) if module is not None)
+        return next((value for value in found if value is not None), None)
 
 
 BYTECODE_HEADER = 16

@@ -148,4 +148,6 @@ def test_a_literal_that_a_class_states_is_read_without_an_import(modules: Path) 
     )
     module = SourceModule("stating")
     assert [module.stated(name) for name in ("wanted", "name", "made", "other")] == [False, False, None, None]
+    (modules / "extending.py").write_text("from stating import A\nclass B(A[int]):\n    name = 'b'\n")
+    assert [SourceModule("extending").stated(name) for name in ("wanted", "name", "made")] == [False, "b", None]
     assert SourceModule("not_there").stated("wanted") is None

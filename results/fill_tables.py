@@ -19,7 +19,8 @@ import pandas as pd
 
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.claims.evidence import load_evidence
-from codesign_bench.claims.verify import Row, by_rule, contradicted, judge
+from codesign_bench.claims.judging import Row, judge
+from codesign_bench.claims.page import by_rule, contradicted
 from codesign_bench.config.profiles import BUILT_IN
 from codesign_bench.config.resolve import resolve
 from codesign_bench.figures.source import Request, curves_with_references

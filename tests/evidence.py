@@ -9,10 +9,11 @@ import numpy as np
 import pandas as pd
 
 from builders import rising, store_cell
-from codesign_bench.claims.claim import Rule
+from codesign_bench.claims.claim import Claim, Rule
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import Finding
+from codesign_bench.claims.finding import Finding, InsufficientData
 from codesign_bench.storage.records import DONE
+from codesign_bench.study.study import Study
 
 TASK, OURS, OTHER = "push", "gnn_ppo", "cma_rl"
 
@@ -20,6 +21,24 @@ TASK, OURS, OTHER = "push", "gnn_ppo", "cma_rl"
 def found(rule: Rule, evidence: Evidence) -> Finding:
     """Return what a rule finds."""
     return rule.judge(evidence, np.random.default_rng(0))
+
+
+def claim(name: str, finding: Finding | None) -> Claim:
+    """Return a claim that comes out as `finding`, or lacks data where it is None."""
+
+    def found(evidence: Evidence, rng: np.random.Generator) -> Finding:
+        if finding is None:
+            raise InsufficientData("nothing there")
+        return finding
+
+    return Claim(
+        name, f"sentence of {name}", "section", Rule("kind", "number", "words", ("make {results}{profile}",), found)
+    )
+
+
+def study_of(claims: Sequence[Claim]) -> Study:
+    """Return a study that has these claims alone."""
+    return Study(name="small", title="A small study", question="Is it so?", claims=lambda: claims)
 
 
 def cells(method: str, variant: str = "default", *, task: str = TASK, **columns: Sequence[object]) -> pd.DataFrame:

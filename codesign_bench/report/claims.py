@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codesign_bench.claims.evidence import load_evidence
-from codesign_bench.claims.verify import P_VALUES, STATISTIC, Row, apart, judge, missing, summary
+from codesign_bench.claims.judging import Row, apart, judge, missing
+from codesign_bench.claims.page import P_VALUES, STATISTIC, summary
 from codesign_bench.errors import UserError
 from codesign_bench.study.study import Study
 

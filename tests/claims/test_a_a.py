@@ -14,7 +14,7 @@ from codesign_bench.claims import comparison
 from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.evidence import Evidence, load_evidence
 from codesign_bench.claims.finding import LEVEL, UNDECIDED, Finding, InsufficientData
-from codesign_bench.claims.verify import Row, adjusted
+from codesign_bench.claims.judging import Row, adjusted
 
 REFERENCE = Path(__file__).resolve().parents[2] / "results" / "reference"
 METHODS = ("gnn_ppo", "shared_arch", "hwasp_minimal", "cma_rl")

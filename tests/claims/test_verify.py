@@ -1,201 +1,45 @@
-"""Claims are judged one by one, and their verdicts counted, told and written."""
+"""What claims lack is measured on demand, and both files are written."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
+from rich.console import Console
 
-from codesign_bench import stats
-from codesign_bench.claims.claim import Claim, Rule
-from codesign_bench.claims.evidence import Evidence, load_evidence
-from codesign_bench.claims.finding import (
-    CEILING,
-    CONTRADICTED,
-    NOT_ASKED,
-    SUPPORTED,
-    UNDECIDED,
-    Finding,
-    InsufficientData,
-)
-from codesign_bench.claims.verify import as_json, as_markdown, judge, missing, summary
-from codesign_bench.cli.program import build_parser
-from codesign_bench.study.study import Study, load_study, study_names
-from evidence import make_results
-
-PAPER = load_study("corl2023")
-CLAIMS = PAPER.claims()
-ALL_CLAIMS = [claim for name in study_names() for claim in load_study(name).claims()]
+from codesign_bench.claims.claim import Claim
+from codesign_bench.claims.finding import SUPPORTED, Finding
+from codesign_bench.claims.verify import JSON_FILE, MARKDOWN_FILE, verify
+from codesign_bench.console import Log
+from codesign_bench.errors import UserError
+from evidence import claim, make_results, study_of
 
 
-def study_of(claims: Sequence[Claim]) -> Study:
-    """Return a study that has these claims alone."""
-    return Study(name="small", title="A small study", question="Is it so?", claims=lambda: claims)
+def test_data_are_measured_where_asked_and_what_cannot_be_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measured = []
 
+    def measure(results: Path, log: Log) -> None:
+        measured.append(results)
 
-def claim(name: str, finding: Finding | None) -> Claim:
-    """Return a claim that comes out as `finding`, or lacks data where it is None."""
+    def refuse(results: Path, log: Log) -> None:
+        raise UserError("no policy")
 
-    def found(evidence: Evidence, rng: np.random.Generator) -> Finding:
-        if finding is None:
-            raise InsufficientData("nothing there")
-        return finding
+    def needing(name: str, how: object, task: str = "push") -> Claim:
+        plain = claim(name, Finding(SUPPORTED, 1.0))
+        return replace(plain, tasks=(task,), rule=replace(plain.rule, measure=how))
 
-    return Claim(
-        name, f"sentence of {name}", "section", Rule("kind", "number", "words", ("make {results}{profile}",), found)
-    )
-
-
-def test_missing_data_are_named_with_the_command_that_makes_them_alike(tmp_path: Path) -> None:
-    make_results(tmp_path)
-    rows = {row.claim.name: row for row in judge(CLAIMS, load_evidence(tmp_path), str(tmp_path))}
-    lacking = rows["final_return.push.cma_es"]
-    assert lacking.finding.note == "0 finished seeds of push/cma_es/default; 3 are needed"
-    (command,) = lacking.needs
-    assert command == f"codesign-bench run --method all --task push --seeds 6 --profile quick --out {tmp_path}"
-    assert rows["final_return.push.cma_rl"].needs == ()
-
-
-def test_the_commands_for_missing_data_are_understood(tmp_path: Path) -> None:
-    make_results(tmp_path)
-    whatever_the_task = [replace(claim, tasks=()) for claim in ALL_CLAIMS]
-    commands = missing(judge(whatever_the_task, load_evidence(tmp_path), str(tmp_path)))
-    assert len(commands) == len(set(commands)) > 5
-    for command in commands:
-        assert build_parser().parse_args(command.split()[1:]).command
-
-
-def test_claims_of_each_verdict_are_counted_and_told() -> None:
-    claims = [
-        claim("one", Finding(SUPPORTED, 1.0, 0.5, 1.5, n="3 seeds", note="so be it")),
-        claim("two", Finding(UNDECIDED, 2.0, 0.0, float("inf"), n="3 seeds")),
-        claim("three", None),
-    ]
-    rows = judge(claims, Evidence(), "here")
-    assert summary(rows) == (
-        "3 claims: 1 supported, 0 contradicted, 2 undecided, 0 ceiling (1 undecided for lack of data)"
-    )
-    assert [row.interval for row in rows] == ["1.00 [0.50, 1.50]", "2.00 [0.00, never]", "-"]
-    assert missing(rows) == ["make here"]
-    study = study_of(claims)
-    page = as_markdown(rows, study, Path("here"))
-    assert "| sentence of one | *supported* | 1.00 [0.50, 1.50] |  |  | 3 seeds | kind | section | so be it |" in page
-    assert "nothing there; needs: `make here`" in page
-    assert "| kind | 1 | 0 | 2 | 0 |" in page
-    assert "## Contradicted\n\nNone.\n" in page
-    one, two, three = as_json(rows, study, Path("here"))["claims"]
-    assert (one["value"], one["low"], one["high"]) == (1.0, 0.5, 1.5)
-    assert (two["high"], three["value"], three["needs"]) == ("inf", None, ["make here"])
-
-
-def test_p_values_are_adjusted_within_each_kind_of_rule() -> None:
-    findings = {"a": 0.01, "b": 0.03, "c": 0.04, "d": math.nan}
-    claims = [claim(name, Finding(SUPPORTED, 1.0, 0.5, 1.5, p=p)) for name, p in findings.items()]
-    other = claim("other", Finding(CONTRADICTED, -1.0, p=0.04))
-    claims.append(replace(other, rule=replace(other.rule, kind="another")))
-    rows = judge([*claims, claim("lacking", None)], Evidence(), "here")
-    # Of three: 0.01 times 3; 0.03 times 2; 0.04, but no less than that. A family of one stays as it is.
-    adjusted = [row.finding.p_adjusted for row in rows]
-    assert adjusted[:3] + adjusted[4:5] == pytest.approx([0.03, 0.06, 0.06, 0.04])
-    assert [row.finding.family_size for row in rows] == [3, 3, 3, 0, 1, 0]
-    verdicts = [row.finding.verdict for row in rows]
-    assert verdicts == [SUPPORTED, UNDECIDED, UNDECIDED, SUPPORTED, CONTRADICTED, UNDECIDED]
-    assert rows[1].finding.note == "p is 0.060 after adjustment for 3 claims"
-    assert rows[0].p_values == ("0.010", "0.030 (3)")
-    assert rows[3].p_values == ("", "")
-    entry = as_json(rows, study_of(claims), Path("here"))["claims"][0]
-    assert (entry["p"], entry["p_adjusted"], entry["family_size"]) == (0.01, pytest.approx(0.03), 3)
-    assert "| 0.010 | 0.030 (3) |" in as_markdown(rows, study_of(claims), Path("here"))
-
-
-def test_a_p_value_that_may_be_read_twice_counts_twice() -> None:
-    once = claim("once", Finding(SUPPORTED, 1.0, 0.5, 1.5, p=0.015))
-    twice = replace(claim("twice", Finding(SUPPORTED, 1.0, 0.5, 1.5, p=0.012)), looks=2)
-    hopeless = replace(claim("hopeless", Finding(UNDECIDED, 0.1, -0.5, 0.7, p=0.7)), looks=2)
-    rows = judge([once, twice, hopeless], Evidence(), "here")
-    # 0.015 is now the least of three (times 3); 0.024 the second (times 2); 1.4 is 1.
-    assert [row.finding.p_adjusted for row in rows] == pytest.approx([0.045, 0.048, 1.0])
-    assert [entry["looks"] for entry in as_json(rows, study_of([]), Path("here"))["claims"]] == [1, 2, 2]
-
-
-def test_two_looks_at_nothing_err_as_rarely_as_promised() -> None:
-    """Five seeds of each method and, where they do not differ, five more: both methods are the same."""
-    rng, level, wrong = np.random.default_rng(0), 0.05, {1: 0, 2: 0}
-    for _ in range(2000):
-        first, second = rng.normal(size=(2, 10))
-        smallest = min(stats.welch(first[:count], second[:count]).p for count in (5, 10))
-        for looks in wrong:
-            wrong[looks] += looks * smallest < level
-    assert wrong[1] / 2000 > 0.065, "reading twice as if once errs too often"
-    assert wrong[2] / 2000 < 0.05
-
-
-def test_checks_of_the_scenes_stand_apart() -> None:
-    claims = [
-        claim("found", Finding(CEILING, 0.1, 0.0, 0.2)),
-        replace(claim("intended", Finding(SUPPORTED, 1.0, 0.5, 1.5)), check_of_scene=True),
-    ]
-    rows, study = judge(claims, Evidence(), "here"), study_of(claims)
-    assert summary(rows) == (
-        "1 claims: 0 supported, 0 contradicted, 0 undecided, 1 ceiling; "
-        "1 checks of the scenes: 1 supported, 0 contradicted, 0 undecided, 0 ceiling (0 undecided for lack of data)"
-    )
-    content = as_json(rows, study, Path("here"))
-    assert [entry["name"] for entry in content["claims"]] == ["found"]
-    assert [entry["name"] for entry in content["checks_of_scenes"]] == ["intended"]
-    page = as_markdown(rows, study, Path("here"))
-    discoveries, checks = page.split("## Checks of the scenes")
-    assert "| kind | 0 | 0 | 0 | 1 |" in discoveries
-    assert "| kind (check of the scene) | 1 | 0 | 0 | 0 |" in discoveries
-    assert "sentence of found" in discoveries.split("## Every claim")[1]
-    assert "sentence of intended" not in discoveries.split("## Every claim")[1]
-    assert "sentence of intended" in checks
-
-
-def test_what_the_scenes_were_chosen_for_is_a_check_of_them() -> None:
-    checks = {entry.name for entry in CLAIMS if entry.check_of_scene}
-    assert {name for name in checks if name.endswith("shared_arch")} == set()
-    assert {entry.name for entry in CLAIMS if entry.name.startswith("no_single_tool.")} <= checks
-    for baseline in ("cma_rl", "hwasp_minimal", "cma_es"):
-        assert {entry.name for entry in CLAIMS if entry.name.endswith(f".{baseline}")} <= checks
-
-
-def test_what_is_contradicted_is_listed_with_its_number() -> None:
-    claims = [claim("one", Finding(CONTRADICTED, 0.25, 0.2, 0.3, n="3 seeds"))]
-    page = as_markdown(judge(claims, Evidence(), "here"), study_of(claims), Path("here"))
-    assert "- sentence of one: 0.25 [0.20, 0.30] (3 seeds)\n" in page
-
-
-def test_a_claim_about_a_task_without_results_is_not_asked() -> None:
-    asked = claim("asked", Finding(SUPPORTED, 1.0))
-    elsewhere = replace(claim("elsewhere", Finding(SUPPORTED, 1.0)), tasks=("weave",))
-    rows = judge([asked, elsewhere], Evidence(), "here")
-    assert [row.finding.verdict for row in rows] == [SUPPORTED, NOT_ASKED]
-    assert summary(rows) == (
-        "1 claims: 1 supported, 0 contradicted, 0 undecided, 0 ceiling (0 undecided for lack of data); "
-        "1 more not asked, without results of all of weave"
-    )
-    assert missing(rows) == []
-    assert "sentence of elsewhere" not in as_markdown(rows, study_of([asked, elsewhere]), Path("here"))
-
-
-def test_a_new_claim_moves_no_other_draw() -> None:
-    def drawn(evidence: Evidence, rng: np.random.Generator) -> Finding:
-        return Finding(UNDECIDED, float(rng.random()))
-
-    first, second = (Claim(name, "", "", Rule("", "", "", (), drawn)) for name in ("first", "second"))
-    values = [row.finding.value for row in judge([first, second], Evidence(), "")]
-    assert values[0] != values[1]
-    assert [row.finding.value for row in judge([second], Evidence(), "")] == values[1:]
-
-
-def test_names_of_claims_are_unique_and_commands_have_their_places() -> None:
-    names = [claim.name for claim in ALL_CLAIMS]
-    assert len(names) == len(set(names))
-    for entry in ALL_CLAIMS:
-        assert entry.rule.needs
-        assert all("{results}" in command for command in entry.rule.needs)
+    make_results(tmp_path / "runs")
+    study = study_of([needing("one", measure), needing("two", refuse), needing("elsewhere", measure, "weave")])
+    verify(study, tmp_path / "runs", tmp_path / "out", Console())
+    assert measured == []
+    verify(study, tmp_path / "runs", tmp_path / "out", Console(), measure=True, left_out=["a file"])
+    assert measured == [tmp_path / "runs"], "once for each claim about a task that there are results of"
+    assert "two left out: no policy" in capsys.readouterr().out
+    content = json.loads((tmp_path / "out" / JSON_FILE).read_text())
+    assert {entry["name"]: entry["verdict"] for entry in content["claims"]}["one"] == SUPPORTED
+    assert content["left_out"] == ["a file"]
+    assert "- a file" in (tmp_path / "out" / MARKDOWN_FILE).read_text()

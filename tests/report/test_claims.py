@@ -6,7 +6,7 @@ import math
 
 from codesign_bench.claims.claim import Claim, Rule
 from codesign_bench.claims.finding import Finding
-from codesign_bench.claims.verify import Row
+from codesign_bench.claims.judging import Row
 from codesign_bench.report.claims import part
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from codesign_bench.claims.evidence import load_evidence
-from codesign_bench.claims.verify import judge
+from codesign_bench.claims.judging import judge
 from codesign_bench.storage.frames import default_rows, load_results
 from codesign_bench.study.study import load_study
 

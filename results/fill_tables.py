@@ -27,7 +27,7 @@ from codesign_bench.figures.source import Request, curves_with_references
 from codesign_bench.method import load_method
 from codesign_bench.registry import built_in, in_order, load_module
 from codesign_bench.sharing.leaderboard import leaderboard
-from codesign_bench.stats import final_values, welch_across
+from codesign_bench.stats import final_values, late_gains, welch_across
 from codesign_bench.storage.reference_points import FILE, POINTS, load_reference_points
 from codesign_bench.study import DEFAULT_STUDY, load_study
 from codesign_bench.text_tables import markdown
@@ -40,6 +40,7 @@ LONGER = ROOT / "results" / "longer"
 ALL_METHODS = ROOT / "results" / "all_methods"
 SUBMISSIONS = ROOT / "results" / "submissions"
 SEARCH = ROOT / "results" / "search"
+PLATEAU = ROOT / "results" / "plateau"
 PAGES = {
     ROOT / "docs" / "results.md": REFERENCE,
     ROOT / "docs" / "reference_points.md": REFERENCE,
@@ -150,6 +151,22 @@ def _budgets() -> str:
     return markdown(["task", *(f"`{profile}`" for profile in BUILT_IN)], rows)
 
 
+def _plateau() -> str:
+    """Return how much curves on tuning seeds still rose at the budgets that were tried for `workstation`."""
+    frame = curves_with_references(Request(PLATEAU))
+    last = frame.sort_values("env_steps", kind="stable").groupby(["task", "seed"], as_index=False).tail(1)
+    gains = late_gains(frame, "normalized_score").set_index("task")["late_gain"]
+    lines = []
+    for task in in_order("tasks", last["task"].unique()):
+        own = last[last["task"] == task]
+        seeds = ", ".join(str(seed) for seed in sorted(own["seed"]))
+        success, score = own["success_rate"].mean(), own["normalized_score"].mean()
+        lines.append(
+            [task, seeds, f"{own['env_steps'].mean():,.0f}", f"{success:.2f}", f"{score:.2f}", f"{gains[task]:+.3f}"]
+        )
+    return markdown(["task", "tuning seeds", "steps", "success", "normalised score", "late gain"], lines)
+
+
 def _search(results: Path) -> str:
     """Return what the common search found for every method, one line each."""
     table = pd.read_csv(results / TABLE_FILE)
@@ -197,6 +214,7 @@ MAKERS: dict[str, Callable[[Path], str]] = {
     "search": _search,
     "leaderboard": lambda folder: leaderboard(folder, "../results/submissions"),
     "budgets": lambda _: _budgets(),
+    "plateau": lambda _: _plateau(),
     "claims": lambda results: by_rule(_judged(results)),
     "contradicted": lambda results: contradicted(_judged(results)),
 }

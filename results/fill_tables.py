@@ -23,12 +23,13 @@ from codesign_bench.claims.judging import Row, judge
 from codesign_bench.claims.page import by_rule, contradicted
 from codesign_bench.config.profiles import BUILT_IN
 from codesign_bench.config.resolve import resolve
-from codesign_bench.figures.source import Request, curves_with_references
+from codesign_bench.figures.source import Request, final_curves
 from codesign_bench.method import load_method
 from codesign_bench.registry import built_in, in_order, load_module
 from codesign_bench.sharing.leaderboard import leaderboard
-from codesign_bench.stats import final_values, late_gains, welch_across
-from codesign_bench.storage.reference_points import FILE, POINTS, load_reference_points
+from codesign_bench.stats import final_values, welch_across
+from codesign_bench.storage.frames import stored_curves
+from codesign_bench.storage.reference_points import FILE, POINTS, load_reference_points, with_reference_points
 from codesign_bench.study import DEFAULT_STUDY, load_study
 from codesign_bench.text_tables import markdown
 from codesign_bench.tuning.results import TABLE_FILE
@@ -69,7 +70,7 @@ def _success(results: Path) -> str:
 
 @lru_cache
 def _curves(results: Path) -> pd.DataFrame:
-    return curves_with_references(Request(results))
+    return final_curves(Request(results))
 
 
 def _reference_points(results: Path) -> str:
@@ -153,18 +154,20 @@ def _budgets() -> str:
 
 def _plateau() -> str:
     """Return how much curves on tuning seeds still rose at the budgets that were tried for `workstation`."""
-    frame = curves_with_references(Request(PLATEAU))
-    last = frame.sort_values("env_steps", kind="stable").groupby(["task", "seed"], as_index=False).tail(1)
-    gains = late_gains(frame, "normalized_score").set_index("task")["late_gain"]
-    lines = []
-    for task in in_order("tasks", last["task"].unique()):
-        own = last[last["task"] == task]
-        seeds = ", ".join(str(seed) for seed in sorted(own["seed"]))
-        success, score = own["success_rate"].mean(), own["normalized_score"].mean()
-        lines.append(
-            [task, seeds, f"{own['env_steps'].mean():,.0f}", f"{success:.2f}", f"{score:.2f}", f"{gains[task]:+.3f}"]
-        )
-    return markdown(["task", "tuning seeds", "steps", "success", "normalised score", "late gain"], lines)
+    final = load_module("paper_figs", "final_results")
+    # Their best known is that of the results of all methods, which have the same versions of the tasks.
+    table = final.per_task(final.data(with_reference_points(stored_curves(PLATEAU, finished=True), ALL_METHODS)))
+    lines = [
+        [
+            row["task"],
+            f"{row['seeds']}",
+            f"{row['env_steps']:,.0f}",
+            *(f"{row[name]:.2f}" for name in ("success_rate", "normalized_score")),
+            f"{row['late_gain']:+.3f}",
+        ]
+        for row in table.to_dict("records")
+    ]
+    return markdown(["task", "number of seeds", "steps", "success", "normalised score", "late gain"], lines)
 
 
 def _search(results: Path) -> str:

@@ -42,11 +42,11 @@ def summary(rows: Sequence[Row]) -> str:
     asked = [row for row in rows if row.asked]
     found, checks = apart(asked)
     lacking = sum(bool(row.needs) for row in asked)
-    told = f"{len(found)} claims: {_counted(found)}"
-    told += f"; {len(checks)} checks of the scenes: {_counted(checks)}" if checks else ""
+    counts = f"{len(found)} claims: {_counted(found)}"
+    counts += f"; {len(checks)} checks of the scenes: {_counted(checks)}" if checks else ""
     tasks = dict.fromkeys(task for row in rows if not row.asked for task in row.claim.tasks)
     others = f"; {len(rows) - len(asked)} more not asked, without results of all of {', '.join(tasks)}" if tasks else ""
-    return f"{told} ({lacking} undecided for lack of data){others}"
+    return f"{counts} ({lacking} undecided for lack of data){others}"
 
 
 def _counted(rows: Sequence[Row]) -> str:

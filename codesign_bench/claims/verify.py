@@ -92,9 +92,9 @@ def write_rows(
     Raises:
         UserError: `out` is not writable.
     """
-    told = study, results, made, left_out
+    given = study, results, made, left_out
     paths = [out / JSON_FILE, out / MARKDOWN_FILE]
     with Outputs(f"--out {out}") as outputs:
-        outputs.write(paths[0], json_bytes(as_json(rows, *told)))
-        outputs.write(paths[1], as_markdown(rows, *told))
+        outputs.write(paths[0], json_bytes(as_json(rows, *given)))
+        outputs.write(paths[1], as_markdown(rows, *given))
     return paths

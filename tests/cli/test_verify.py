@@ -27,8 +27,8 @@ def test_verify_prints_and_writes_a_row_for_each_claim(tmp_path: Path, capsys: p
     rows = {line.split()[1]: line for line in printed if line.split()[0] in VERDICTS}
     assert set(rows) == {claim.name for claim in CLAIMS if set(claim.tasks) <= {"push"}}
     # Returns of 2, 2.1 and 2.2 against 1: 1.1 -+ 4.303 * 0.1 / sqrt 3, t = 1.1 sqrt 3 / 0.1 and p = 0.0027.
-    told = "supported final_return.push.cma_rl 1.10 [0.85, 1.35] 0.003 0.005"
-    assert " ".join(rows["final_return.push.cma_rl"].split()[:7]) == told, "a family of one, judged up to two times"
+    expected = "supported final_return.push.cma_rl 1.10 [0.85, 1.35] 0.003 0.005"
+    assert " ".join(rows["final_return.push.cma_rl"].split()[:7]) == expected, "a family of one, judged up to two times"
     assert rows["steps.push.cma_rl"].split()[0] == "supported"
     assert rows["tools_vary.push"].startswith("undecided")
     assert rows["final_return.push.cma_es"].startswith("undecided")

@@ -215,7 +215,7 @@ class CatchBalls(Task):
     run_settings: ClassVar[ByProfile] = {
         "quick": {"steps": 400_000, "tradeoff_scale": 0.02},
         "laptop": {"tradeoff_scale": 0.02},
-        "workstation": {"steps": 2_000_000, "tradeoff_scale": 0.02},
+        "workstation": {"steps": 1_000_000, "tradeoff_scale": 0.02},
     }
     outcome = Quantity("balls held", "balls")
     soundness = Soundness(

@@ -15,7 +15,6 @@ from codesign_bench.task import (
     Behaviour,
     Booleans,
     Box,
-    ByProfile,
     Floats,
     Given,
     Quantity,
@@ -184,7 +183,6 @@ class Push(Task):
     }
     success_steps = REST_STEPS
 
-    run_settings: ClassVar[ByProfile] = {"workstation": {"steps": 2_000_000}}
     outcome = Quantity("distance from puck to goal", "m")
     # A puck squeezed between two links can leave up to a fifth faster than they move, before the contact solver
     # converges.

@@ -46,6 +46,9 @@ class Claim:
     """Tasks of the claim; without results of all of them, the claim is not asked."""
     check_of_scene: bool = False
     """Whether the scene was chosen so that the claim holds; the claim then checks the scene and is no discovery."""
+    adds_seeds_of: tuple[str, ...] = ()
+    """Methods that get more seeds on the claim's only task if the first look leaves it undecided, not at a ceiling and
+    not shown to be equivalent; empty if it asks for none."""
     looks: int = 1
     """How many times it may be judged while seeds are added. The p-value counts as often (Bonferroni): one that is
     read at every look falls below a level by luck more often than one that is read once."""

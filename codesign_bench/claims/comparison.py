@@ -44,10 +44,10 @@ def final_return_above(task: str, method: str, baseline: str, needs: tuple[str, 
         if _at_ceiling(evidence, task, method, baseline):
             return Finding(CEILING, found.value, found.low, found.high, n, joined(told, TOO_EASY), found.p)
         verdict = above(found, least=least)
+        same = verdict == UNDECIDED and stats.equivalent(first, second, least)
         if verdict == UNDECIDED:
-            same = f"equivalent within {least:.2g}" if stats.equivalent(first, second, least) else ""
-            told = joined(told, reason(found, least=least), same)
-        return Finding(verdict, found.value, found.low, found.high, n, told, found.p)
+            told = joined(told, reason(found, least=least), f"equivalent within {least:.2g}" if same else "")
+        return Finding(verdict, found.value, found.low, found.high, n, told, found.p, equivalent=same)
 
     return Rule(
         kind="final return above",

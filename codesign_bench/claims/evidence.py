@@ -80,6 +80,11 @@ class Evidence:
             raise InsufficientData(f"{counted} of {task}/{method}/{variant.name}; {MIN_SEEDS} are needed")
         return rows
 
+    def seeds(self, task: str, method: str) -> list[int]:
+        """Return the seeds of a method's finished cells that vary nothing on a task, in ascending order."""
+        rows = _select(self.evaluations, task, method, DEFAULT)
+        return sorted({int(seed) for seed in rows["seed"]}) if len(rows) else []
+
     def final_returns(self, task: str, method: str, variant: Variant = DEFAULT) -> np.ndarray:
         """Return the mean return over evaluation instances at the end of training, (N,).
 

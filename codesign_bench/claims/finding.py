@@ -42,6 +42,8 @@ class Finding:
     claims are judged together."""
     family_size: int = 0
     """Number of claims in that adjustment."""
+    equivalent: bool = False
+    """Whether an undecided difference is shown to be smaller than the least that counts; more seeds are not needed."""
 
     @property
     def is_directional(self) -> bool:

@@ -17,6 +17,9 @@ from codesign_bench.seeding import generator
 SEED = 0
 """Seed of permutations. Each claim has a separate random stream, so a new claim does not change other p-values."""
 
+ALL_SEEDS = 10
+"""Seeds of a method at the second and last look (ours)."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -26,6 +29,8 @@ class Row:
     finding: Finding
     needs: tuple[str, ...] = ()
     """Commands that produce missing data; empty if none are missing."""
+    further_seeds: str = ""
+    """Command that adds seeds where the first look left the claim undecided; empty if it asks for none."""
 
     @property
     def asked(self) -> bool:
@@ -58,7 +63,8 @@ def judge(claims: Sequence[Claim], evidence: Evidence, results: str) -> list[Row
         evidence: their data.
         results: the folder in commands for missing data.
     """
-    return adjusted([_row(claim, evidence, results) for claim in claims])
+    rows = adjusted([_row(claim, evidence, results) for claim in claims])
+    return [replace(row, further_seeds=_further_seeds(row, evidence, results)) for row in rows]
 
 
 def adjusted(rows: Sequence[Row]) -> list[Row]:
@@ -78,8 +84,7 @@ def adjusted(rows: Sequence[Row]) -> list[Row]:
 
 
 def _row(claim: Claim, evidence: Evidence, results: str) -> Row:
-    profile = "" if evidence.profile == DEFAULT_PROFILE else f" --profile {evidence.profile}"
-    needs = tuple(command.format(results=results, profile=profile) for command in claim.rule.needs)
+    needs = tuple(command.format(results=results, profile=_profile(evidence)) for command in claim.rule.needs)
     absent = [task for task in claim.tasks if task not in evidence.tasks]
     if absent:
         return Row(claim, Finding(NOT_ASKED, math.nan, note=f"no results of {', '.join(absent)}"), needs)
@@ -98,6 +103,31 @@ def apart(rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
 def missing(rows: Sequence[Row]) -> list[str]:
     """Return the commands that produce all missing data of the claims that are asked, without duplicates."""
     return list(dict.fromkeys(command for row in rows if row.asked for command in row.needs))
+
+
+def further_seeds(rows: Sequence[Row]) -> list[str]:
+    """Return the commands that add seeds for a second look, without duplicates."""
+    return list(dict.fromkeys(row.further_seeds for row in rows if row.further_seeds))
+
+
+def _further_seeds(row: Row, evidence: Evidence, results: str) -> str:
+    """Return the command that adds the seeds of the second look; empty if nothing is left to decide or to add."""
+    methods, finding = row.claim.adds_seeds_of, row.finding
+    if not methods or row.needs or finding.verdict != UNDECIDED or finding.equivalent:
+        return ""
+    (task,) = row.claim.tasks
+    fewest = min((evidence.seeds(task, method) for method in methods), key=len)
+    if not 0 < len(fewest) < ALL_SEEDS:
+        return ""
+    seeds = f"{fewest[-1] + 1}-{fewest[-1] + ALL_SEEDS - len(fewest)}"
+    return (
+        f"codesign-bench run --method {' '.join(methods)} --task {task} --seeds {seeds}{_profile(evidence)} "
+        f"--out {results}"
+    )
+
+
+def _profile(evidence: Evidence) -> str:
+    return "" if evidence.profile == DEFAULT_PROFILE else f" --profile {evidence.profile}"
 
 
 def _number(value: float) -> str:

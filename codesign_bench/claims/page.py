@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from codesign_bench import __version__, stats
 from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.finding import CONTRADICTED, LEVEL, VERDICTS
-from codesign_bench.claims.judging import Row, apart, missing
+from codesign_bench.claims.judging import Row, apart, further_seeds, missing
 from codesign_bench.storage import provenance
 from codesign_bench.storage.places import shown
 from codesign_bench.text_tables import markdown, plain_markdown
@@ -92,6 +92,7 @@ def _entry(row: Row) -> dict[str, Any]:
         "n": row.finding.n,
         "note": row.finding.note,
         "needs": list(row.needs),
+        "further_seeds": row.further_seeds,
     }
 
 
@@ -121,8 +122,9 @@ def as_markdown(
         parts += ["## How the cells were made\n", provenance.as_markdown(made)]
     if left_out:
         parts += ["## Files that cannot be used\n", "\n".join(f"- {plain_markdown(line)}" for line in left_out) + "\n"]
-    if missing(rows):
-        parts += ["## Data that are missing\n", "```\n" + "\n".join(map(on_one_line, missing(rows))) + "\n```\n"]
+    for heading, commands in (("Data that are missing", missing(rows)), (SECOND_LOOK, further_seeds(rows))):
+        if commands:
+            parts += [f"## {heading}\n", "```\n" + "\n".join(map(on_one_line, commands)) + "\n```\n"]
     return "\n".join(parts)
 
 
@@ -132,6 +134,7 @@ HOW_SURE = (
     f"follows from a test needs one below {LEVEL:g}. Fewer than {stats.MIN_SEEDS} seeds give no interval and decide "
     "nothing."
 )
+SECOND_LOOK = "Seeds for a second look at what is undecided"
 SCENES = (
     "The scenes were chosen so that one tool does not serve all goals. That no single tool does, and that methods with "
     "one tool for all goals fall behind, shows that the scenes are as intended; it is no discovery about a method."

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.evidence import Evidence, load_evidence
-from codesign_bench.claims.judging import Row, judge, missing
+from codesign_bench.claims.judging import Row, further_seeds, judge, missing
 from codesign_bench.claims.page import P_VALUES, STATISTIC, Claimant, as_json, as_markdown, summary
 from codesign_bench.console import Log, print_table, printer
 from codesign_bench.errors import UserError
@@ -62,7 +62,7 @@ def _measure(claims: Sequence[Claim], evidence: Evidence, results: Path, log: Lo
 
 
 def print_rows(rows: Sequence[Row], console: Console) -> None:
-    """Print one line per claim that is asked, then counts and commands for missing data.
+    """Print one line per claim that is asked, then counts and commands for missing data and for further seeds.
 
     Checks of the scenes come after the other claims, claims without data last.
     """
@@ -73,8 +73,11 @@ def print_rows(rows: Sequence[Row], console: Console) -> None:
         for row in ordered
     ]
     print_table(console, ("verdict", "claim", STATISTIC, *P_VALUES, "n", "note"), table)
-    for line in (summary(rows), *(f"needs: {command}" for command in missing(rows))):
-        log(line)
+    log(summary(rows))
+    for command in missing(rows):
+        log(f"needs: {command}")
+    for command in further_seeds(rows):
+        log(f"second look: {command}")
 
 
 def write_rows(

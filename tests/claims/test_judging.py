@@ -7,13 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from codesign_bench import stats
 from codesign_bench.claims.claim import Claim, Rule
 from codesign_bench.claims.evidence import Evidence, load_evidence
-from codesign_bench.claims.finding import CONTRADICTED, NOT_ASKED, SUPPORTED, UNDECIDED, Finding
-from codesign_bench.claims.judging import judge, missing
+from codesign_bench.claims.finding import CEILING, CONTRADICTED, NOT_ASKED, SUPPORTED, UNDECIDED, Finding
+from codesign_bench.claims.judging import further_seeds, judge, missing
 from codesign_bench.claims.page import as_json, as_markdown, summary
 from codesign_bench.cli.program import build_parser
 from codesign_bench.study.study import load_study, study_names
@@ -122,3 +123,38 @@ def test_names_of_claims_are_unique_and_commands_have_their_places() -> None:
     for entry in ALL_CLAIMS:
         assert entry.rule.needs
         assert all("{results}" in command for command in entry.rule.needs)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "equivalent", "seeds", "asked"),
+    [
+        (UNDECIDED, False, (5, 5), "105-109"),
+        (UNDECIDED, False, (10, 5), "105-109"),
+        (UNDECIDED, False, (3, 5), "103-109"),
+        (UNDECIDED, False, (10, 10), None),
+        (UNDECIDED, True, (5, 5), None),
+        (SUPPORTED, False, (5, 5), None),
+        (CEILING, False, (5, 5), None),
+    ],
+)
+def test_what_the_first_look_leaves_open_asks_for_further_seeds(
+    verdict: str, equivalent: bool, seeds: tuple[int, int], asked: str | None
+) -> None:
+    methods = ("gnn_ppo", "cma_rl")
+    cells = [(method, 100 + seed) for method, count in zip(methods, seeds, strict=True) for seed in range(count)]
+    frame = pd.DataFrame(cells, columns=["method", "seed"]).assign(task="push", variant="default")
+    finding = Finding(verdict, 0.1, -0.5, 0.7, p=0.001, equivalent=equivalent)
+    comparison = replace(claim("open", finding), tasks=("push",), adds_seeds_of=methods)
+    rows = judge([comparison, replace(comparison, name="same")], Evidence(evaluations=frame), "here")
+    command = f"codesign-bench run --method gnn_ppo cma_rl --task push --seeds {asked} --out here"
+    assert further_seeds(rows) == ([] if asked is None else [command])
+    if asked is not None:
+        assert build_parser().parse_args(command.split()[1:]).command
+        assert command in as_markdown(rows, study_of([comparison]), Path("here"))
+
+
+def test_what_lacks_data_asks_for_those_first() -> None:
+    lacking = replace(claim("lacking", None), adds_seeds_of=("gnn_ppo", "cma_rl"))
+    (row,) = judge([lacking], Evidence(), "here")
+    assert row.needs == ("make here",)
+    assert row.further_seeds == ""

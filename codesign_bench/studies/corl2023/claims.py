@@ -72,6 +72,7 @@ def _against(baseline: str, final: str, faster: str) -> Iterator[Claim]:
             comparison.final_return_above(task, OURS, baseline, (ALL_METHODS[task],)),
             (task,),
             check_of_scene=one_tool,
+            adds_seeds_of=(OURS, baseline),
             looks=LOOKS,
         )
     for task in TASKS:

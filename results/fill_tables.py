@@ -155,18 +155,21 @@ def _budgets() -> str:
 def _plateau() -> str:
     """Return how much curves on tuning seeds still rose at the budgets that were tried for `workstation`."""
     final = load_module("paper_figs", "final_results")
-    # Their best known is that of the results of all methods, which have the same versions of the tasks.
-    table = final.per_task(final.data(with_reference_points(stored_curves(PLATEAU, finished=True), ALL_METHODS)))
-    lines = [
-        [
-            row["task"],
-            f"{row['seeds']}",
-            f"{row['env_steps']:,.0f}",
-            *(f"{row[name]:.2f}" for name in ("success_rate", "normalized_score")),
-            f"{row['late_gain']:+.3f}",
+    lines = []
+    for budget in sorted(PLATEAU.iterdir(), key=lambda folder: int(folder.name)):
+        # Their best known is that of the results of all methods, which have the same versions of the tasks.
+        table = final.per_task(final.data(with_reference_points(stored_curves(budget, finished=True), ALL_METHODS)))
+        lines += [
+            [
+                row["task"],
+                f"{row['seeds']}",
+                f"{row['env_steps']:,.0f}",
+                *(f"{row[name]:.2f}" for name in ("success_rate", "normalized_score")),
+                f"{row['late_gain']:+.3f}",
+            ]
+            for row in table.to_dict("records")
         ]
-        for row in table.to_dict("records")
-    ]
+    lines.sort(key=lambda line: built_in("tasks").index(line[0].replace(" ", "_")))
     return markdown(["task", "number of seeds", "steps", "success", "normalised score", "late gain"], lines)
 
 

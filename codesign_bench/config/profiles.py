@@ -54,7 +54,7 @@ BUILT_IN: Mapping[str, Profile] = {
         ),
         Profile(
             "workstation",
-            "meant for conclusions: the settings of `laptop`, and longer budgets (estimates so far: docs/budgets.md)",
+            "meant for conclusions: the settings of `laptop`, and longer budgets (docs/budgets.md)",
             sourced({"steps": 3_000_000, "evaluations": 30}, "ours"),
         ),
     )

@@ -7,10 +7,11 @@ import pandas as pd
 import pytest
 from scipy.stats import poisson
 
-from codesign_bench import load_policy, load_task
+from codesign_bench import load_policy
 from codesign_bench.evaluation.evaluate import Evaluation, evaluate
 from codesign_bench.storage.cells import StoredCell
 from codesign_bench.storage.layout import EVALUATION_FILE
+from codesign_bench.storage.policies import problem_of
 
 OTHERWISE = 2 / 128
 """This share of a policy's episodes may on average end otherwise on another machine.
@@ -29,9 +30,10 @@ Rounding changes actions by some 1e-6, and only some contacts make much more of 
 
 def assert_plays_as_stored(cell: StoredCell, episodes: int | None = None) -> None:
     """Assert that a stored policy does again what its `evaluation.csv` tells, in the first `episodes`; None: in all."""
-    task, told = load_task(cell.record.task), pd.read_csv(cell.folder / EVALUATION_FILE).iloc[:episodes]
-    instances = task.evaluation_instances()[:episodes]
-    assert_played_alike(evaluate(task, load_policy(cell.folder), instances=instances), told)
+    problem, told = problem_of(cell), pd.read_csv(cell.folder / EVALUATION_FILE).iloc[:episodes]
+    instances = problem.evaluation_instances()[:episodes]
+    policy = load_policy(cell.folder)
+    assert_played_alike(evaluate(problem.task, policy, problem.tradeoff, instances, problem.simulators), told)
 
 
 def assert_played_alike(again: Evaluation, told: pd.DataFrame) -> None:

@@ -23,10 +23,9 @@ from codesign_bench.deployment.deploy import Order, deploy
 from codesign_bench.deployment.tables import load_deployment
 from codesign_bench.storage.cells import StoredCell, find_cells
 from codesign_bench.storage.layout import EVALUATION_FILE, POLICY_FILE
-from codesign_bench.storage.policies import misfit, policy_and_task
+from codesign_bench.storage.policies import policy_and_task
 from codesign_bench.storage.reference_points import BEST_KNOWN, INSTANCES_FILE, load_reference_points
 from codesign_bench.task import load_task
-from played_alike import assert_plays_as_stored
 
 REFERENCE = Path(__file__).resolve().parents[2] / "results" / "reference"
 
@@ -118,36 +117,6 @@ def test_nothing_is_above_the_best_known() -> None:
 
 def test_the_folder_stays_small() -> None:
     assert sum(path.stat().st_size for path in REFERENCE.rglob("*") if path.is_file()) < 60e6
-
-
-ONE_PER_TASK = [
-    max(group, key=lambda cell: cell.record.method == "gnn_ppo")
-    for _, group in groupby(PLAYABLE, lambda cell: cell.record.task)
-]
-"""Of each task, one policy, with networks if there is one: CMA-ES's plans need none, which leaves less to round."""
-
-
-FEW = 32
-"""Episodes that tell whether a policy is the one that was judged."""
-
-
-@pytest.mark.parametrize(
-    "cell",
-    [pytest.param(cell, marks=pytest.mark.numeric if cell in ONE_PER_TASK else ()) for cell in PLAYABLE],
-    ids=name_of,
-)
-def test_a_shipped_policy_gets_the_shipped_returns(cell: StoredCell) -> None:
-    if reason := misfit(cell):
-        pytest.skip(reason)
-    assert_plays_as_stored(cell, episodes=FEW)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("cell", PLAYABLE, ids=name_of)
-def test_a_shipped_policy_gets_the_shipped_returns_in_every_episode(cell: StoredCell) -> None:
-    if reason := misfit(cell):
-        pytest.skip(reason)
-    assert_plays_as_stored(cell)
 
 
 def test_the_evaluation_of_a_shipped_cell_is_the_end_of_its_curve() -> None:

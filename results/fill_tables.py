@@ -39,6 +39,7 @@ ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "results" / "reference"
 LONGER = ROOT / "results" / "longer"
 ALL_METHODS = ROOT / "results" / "all_methods"
+WORKSTATION = ROOT / "results" / "workstation"
 SUBMISSIONS = ROOT / "results" / "submissions"
 SEARCH = ROOT / "results" / "search"
 PLATEAU = ROOT / "results" / "plateau"
@@ -50,6 +51,7 @@ PAGES = {
     REFERENCE / "README.md": REFERENCE,
     LONGER / "README.md": LONGER,
     ALL_METHODS / "README.md": ALL_METHODS,
+    WORKSTATION / "README.md": WORKSTATION,
     ROOT / "results" / "TUNING.md": SEARCH,
 }
 """Every page and the results, or the folder of archives, that its tables show."""
@@ -221,7 +223,7 @@ MAKERS: dict[str, Callable[[Path], str]] = {
     "leaderboard": lambda folder: leaderboard(folder, "../results/submissions"),
     "budgets": lambda _: _budgets(),
     "plateau": lambda _: _plateau(),
-    "claims": lambda results: by_rule(_judged(results)),
+    "claims": lambda results: by_rule([row for row in _judged(results) if row.asked]),
     "contradicted": lambda results: contradicted(_judged(results)),
 }
 """Every table by its name, made from a results folder."""

@@ -14,7 +14,10 @@ from codesign_bench.sweep.training import CHECKPOINT_SECONDS_VARIABLE
 from toy import GATE_VARIABLE, Gate
 
 TESTS = Path(__file__).parent
-LONGEST = [TESTS / name for name in ("test_third_party.py", "results/test_reference.py", "sweep/test_resume.py")]
+LONGEST = [
+    TESTS / name
+    for name in ("test_third_party.py", "results/test_reference.py", "results/test_policies.py", "sweep/test_resume.py")
+]
 """Files that begin, so that of several processes none waits for another in the end."""
 
 

@@ -64,6 +64,7 @@ OF_NO_MODULE = {
     "tests/learning/test_plain_update.py": "of all of an update's modules together, beside a plain one",
     "tests/methods/test_contract.py": "of every method",
     "tests/methods/test_honesty.py": "of every method: that it is what it says",
+    "tests/results/test_policies.py": "of the shipped policies",
     "tests/results/test_reference.py": "of the shipped results",
     "tests/results/test_ship_cells.py": "of the script results/ship_cells.py",
     "tests/results/test_submissions.py": "of the archives of the leaderboard",

@@ -45,7 +45,7 @@ def verdicts(study: Study) -> str:
         judged = json.loads((folder / "claims" / "claims.json").read_text(encoding="utf-8"))
         for part, label in PARTS.items():
             counts = [f"{number} {v}" for v in VERDICTS if (number := sum(c["verdict"] == v for c in judged[part]))]
-            outcomes += [f"{len(judged[part])} {label}: {', '.join(counts)}"] if judged[part] else []
+            outcomes += [f"{folder.name}: {len(judged[part])} {label}: {', '.join(counts)}"] if judged[part] else []
     return "; ".join(outcomes) or "no results yet"
 
 
@@ -68,10 +68,10 @@ def study_page(study: Study) -> str:
     for folder in folders:
         name = folder.relative_to(ROOT).as_posix()
         parts += [
-            f"## Verdicts\n\n[{name}]({name}/README.md) says how these results were made, and which verdicts do "
-            "not count any more. Read it before you use a number from here.",
+            f"## Verdicts on {name}\n\n[{name}]({name}/README.md) says how these results were made, and which verdicts "
+            "do not count any more. Read it before you use a number from here.",
             claims_of(folder),
-            f"## Figures\n\n{figures_of(study, folder)}",
+            f"## Figures of {name}\n\n{figures_of(study, folder)}",
         ]
     return "\n\n".join(parts) + "\n"
 

@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+TUNING_SEEDS = range(10)
+"""Seeds on which settings may be chosen."""
+
 
 class Streams:
     """The random streams of one run: `streams["rollout"]` is always the same generator object.

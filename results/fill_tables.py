@@ -171,7 +171,7 @@ def _plateau() -> str:
             ]
             for row in table.to_dict("records")
         ]
-    lines.sort(key=lambda line: built_in("tasks").index(line[0].replace(" ", "_")))
+    lines.sort(key=lambda line: built_in("tasks").index(line[0]))
     return markdown(["task", "number of seeds", "steps", "success", "normalised score", "late gain"], lines)
 
 

@@ -30,17 +30,17 @@ Rounding changes actions by some 1e-6, and only some contacts make much more of 
 
 def assert_plays_as_stored(cell: StoredCell, episodes: int | None = None) -> None:
     """Assert that a stored policy does again what its `evaluation.csv` tells, in the first `episodes`; None: in all."""
-    problem, told = problem_of(cell), pd.read_csv(cell.folder / EVALUATION_FILE).iloc[:episodes]
+    problem, stored = problem_of(cell), pd.read_csv(cell.folder / EVALUATION_FILE).iloc[:episodes]
     instances = problem.evaluation_instances()[:episodes]
     policy = load_policy(cell.folder)
-    assert_played_alike(evaluate(problem.task, policy, problem.tradeoff, instances, problem.simulators), told)
+    assert_played_alike(evaluate(problem.task, policy, problem.tradeoff, instances, problem.simulators), stored)
 
 
-def assert_played_alike(again: Evaluation, told: pd.DataFrame) -> None:
+def assert_played_alike(again: Evaluation, stored: pd.DataFrame) -> None:
     """Assert that a policy does again what the rows of its `evaluation.csv` tell, as far as rounding allows."""
-    value = told["return"].to_numpy()
+    value = stored["return"].to_numpy()
     allowed = float(poisson.isf(CHANCE, OTHERWISE * len(value))) / len(value)
     assert np.median(np.abs(again.returns - value) / np.maximum(1.0, np.abs(value))) < ALIKE
-    assert (again.successes != told["success"]).mean() <= allowed
+    assert (again.successes != stored["success"]).mean() <= allowed
     # Whatever an episode comes to, it hardly leaves the range of the others.
     assert again.returns.mean() == pytest.approx(value.mean(), abs=allowed * np.ptp(value) + ALIKE)

@@ -40,14 +40,14 @@ def final_return_above(task: str, method: str, baseline: str, needs: tuple[str, 
         first, second = evidence.final_returns(task, method), evidence.final_returns(task, baseline)
         least = LEAST_SHARE * effect_scale(evidence, task)
         found, n = stats.welch(first, second), seeds_of(first, second)
-        told = f"above in {stats.probability_of_improvement([(first, second)]):.0%} of pairs of seeds"
+        note = f"above in {stats.probability_of_improvement([(first, second)]):.0%} of pairs of seeds"
         if _at_ceiling(evidence, task, method, baseline):
-            return Finding(CEILING, found.value, found.low, found.high, n, joined(told, TOO_EASY), found.p)
+            return Finding(CEILING, found.value, found.low, found.high, n, joined(note, TOO_EASY), found.p)
         verdict = above(found, least=least)
         same = verdict == UNDECIDED and stats.equivalent(first, second, least)
         if verdict == UNDECIDED:
-            told = joined(told, reason(found, least=least), f"equivalent within {least:.2g}" if same else "")
-        return Finding(verdict, found.value, found.low, found.high, n, told, found.p, equivalent=same)
+            note = joined(note, reason(found, least=least), f"equivalent within {least:.2g}" if same else "")
+        return Finding(verdict, found.value, found.low, found.high, n, note, found.p, equivalent=same)
 
     return Rule(
         kind="final return above",
@@ -85,13 +85,13 @@ def sooner(task: str, method: str, baseline: str, needs: tuple[str, ...]) -> Rul
         first, second = (shares_of_budget(rows, target) for rows in curves)
         found = stats.welch(first, second)
         area = stats.welch(*(means_along(rows) for rows in curves))
-        told = joined(
+        note = joined(
             f"{first.mean():.2f} against {second.mean():.2f} of the budget",
             f"mean along the curve {area.value:+.2f} [{area.low:.2f}, {area.high:.2f}]",
             reason(found, least=LEAST_BUDGET),
         )
         verdict = below(found, least=LEAST_BUDGET)
-        return Finding(verdict, found.value, found.low, found.high, seeds_of(first, second), told, found.p)
+        return Finding(verdict, found.value, found.low, found.high, seeds_of(first, second), note, found.p)
 
     return Rule(
         kind="most of the way sooner",
@@ -142,14 +142,14 @@ def ahead_across_tasks(tasks: Sequence[str], method: str, baseline: str, needs: 
         found = stats.welch_across(pairs)
         p = stats.stratified_p(pairs, rng)
         middles = [stats.interquartile_mean(np.concatenate(side)) for side in zip(*pairs, strict=True)]
-        told = joined(
+        note = joined(
             f"above in {stats.probability_of_improvement(pairs):.0%} of pairs of seeds",
             f"interquartile means {middles[0]:.2f} and {middles[1]:.2f}",
             reason(found, least=LEAST_SHARE),
         )
         counts = [len(sample) for pair in pairs for sample in pair]
         n = f"{len(tasks)} tasks, {min(counts)}-{max(counts)} seeds"
-        return Finding(above(found, least=LEAST_SHARE), found.value, found.low, found.high, n, told, p)
+        return Finding(above(found, least=LEAST_SHARE), found.value, found.low, found.high, n, note, p)
 
     return Rule(
         kind="ahead across tasks",

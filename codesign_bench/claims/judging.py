@@ -12,7 +12,7 @@ from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.evidence import Evidence
 from codesign_bench.claims.finding import NOT_ASKED, UNDECIDED, Finding, InsufficientData, probability
 from codesign_bench.config.profiles import DEFAULT_PROFILE
-from codesign_bench.seeding import generator
+from codesign_bench.seeding import TUNING_SEEDS, generator
 
 SEED = 0
 """Seed of permutations. Each claim has a separate random stream, so a new claim does not change other p-values."""
@@ -119,7 +119,9 @@ def _further_seeds(row: Row, evidence: Evidence, results: str) -> str:
     fewest = min((evidence.seeds(task, method) for method in methods), key=len)
     if not 0 < len(fewest) < ALL_SEEDS:
         return ""
-    seeds = f"{fewest[-1] + 1}-{fewest[-1] + ALL_SEEDS - len(fewest)}"
+    # Settings were chosen on the tuning seeds, so none of those may be added to what is reported.
+    first = max(fewest[-1] + 1, TUNING_SEEDS.stop)
+    seeds = f"{first}-{first + ALL_SEEDS - len(fewest) - 1}"
     return (
         f"codesign-bench run --method {' '.join(methods)} --task {task} --seeds {seeds}{_profile(evidence)} "
         f"--out {results}"

@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-TUNING_SEEDS = range(10)
-"""Seeds on which settings may be chosen."""
+from codesign_bench.seeding import TUNING_SEEDS
+
 FIRST_REPORTED_SEED = 100
 """First seed of experiments that report results of tuned settings; such seeds were never used in tuning."""
 

@@ -153,6 +153,15 @@ def test_what_the_first_look_leaves_open_asks_for_further_seeds(
         assert command in as_markdown(rows, study_of([comparison]), Path("here"))
 
 
+def test_seeds_that_tuning_may_have_used_are_never_added() -> None:
+    cells = [(method, seed) for method in ("gnn_ppo", "cma_rl") for seed in range(6)]
+    frame = pd.DataFrame(cells, columns=["method", "seed"]).assign(task="push", variant="default")
+    undecided = claim("open", Finding(UNDECIDED, 0.1, -0.5, 0.7, p=0.5))
+    comparison = replace(undecided, tasks=("push",), adds_seeds_of=("gnn_ppo", "cma_rl"))
+    (command,) = further_seeds(judge([comparison], Evidence(evaluations=frame), "here"))
+    assert "--seeds 10-13 " in command
+
+
 def test_what_lacks_data_asks_for_those_first() -> None:
     lacking = replace(claim("lacking", None), adds_seeds_of=("gnn_ppo", "cma_rl"))
     (row,) = judge([lacking], Evidence(), "here")

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from codesign_bench.registry import names
+from codesign_bench.seeding import TUNING_SEEDS
 from codesign_bench.study import DEFAULT_STUDY, FIRST_REPORTED_SEED, Tuning, load_study, study_names
-from codesign_bench.study.tuning import TUNING_SEEDS
 from codesign_bench.tuning.settings import settings_of
 
 

@@ -10,8 +10,8 @@ import toy
 from codesign_bench import plugins
 from codesign_bench.cell.cell import resolve_cell, resolve_cells
 from codesign_bench.errors import UserError
+from codesign_bench.seeding import TUNING_SEEDS
 from codesign_bench.study import Tuning, load_study
-from codesign_bench.study.tuning import TUNING_SEEDS
 from codesign_bench.tuning.settings import Setting, cells_in_turn, settings_of
 
 

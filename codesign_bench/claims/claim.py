@@ -24,7 +24,8 @@ class Rule:
     words: str
     """When the statistic supports the claim and when it contradicts it."""
     needs: tuple[str, ...]
-    """Commands that produce the data; `{results}` is the results folder, `{profile}` its option or nothing."""
+    """Commands that produce the data; `{results}` is the results folder, `{profile}` its option or nothing,
+    `{seeds[6]}` the value of `--seeds` for the first six seeds of the folder, and `{seed[0]:02d}` the first of them."""
     judge: Callable[[Evidence, np.random.Generator], Finding]
     """The rule itself; raises `InsufficientData` if data are missing."""
     measure: Callable[[Path, Log], object] | None = None

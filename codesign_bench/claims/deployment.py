@@ -110,5 +110,5 @@ def _told(rows: pd.DataFrame) -> str:
 
 
 def _needs(task: str, method: str, seeds: int = 1) -> tuple[str, ...]:
-    cells = (f"{{results}}/{task}/{method}/default/seed-{seed:02d}" for seed in range(seeds))
+    cells = (f"{{results}}/{task}/{method}/default/seed-{{seed[{index}]:02d}}" for index in range(seeds))
     return tuple(f"codesign-bench deploy --policy {cell} --protocol --out {{results}}" for cell in cells)

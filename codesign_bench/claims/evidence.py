@@ -59,6 +59,14 @@ class Evidence:
         frames = (self.curves, self.evaluations, self.sensitivity, self.outside, self.cutout_regions, self.deployment)
         return {str(task) for frame in frames if len(frame) for task in frame["task"].unique()}
 
+    @property
+    def first_seed(self) -> int:
+        """The least seed of the finished cells that vary nothing, from which commands for missing data count; 0 if
+        there are none."""
+        rows = self.evaluations
+        own = rows[rows["variant"] == DEFAULT.name] if len(rows) else rows
+        return int(own["seed"].min()) if len(own) else 0
+
     def methods(self, task: str) -> list[str]:
         """Return the names of the methods with finished cells that vary nothing on a task."""
         rows = self.evaluations

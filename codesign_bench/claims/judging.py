@@ -84,7 +84,7 @@ def adjusted(rows: Sequence[Row]) -> list[Row]:
 
 
 def _row(claim: Claim, evidence: Evidence, results: str) -> Row:
-    needs = tuple(command.format(results=results, profile=_profile(evidence)) for command in claim.rule.needs)
+    needs = tuple(_filled(command, evidence, results) for command in claim.rule.needs)
     absent = [task for task in claim.tasks if task not in evidence.tasks]
     if absent:
         return Row(claim, Finding(NOT_ASKED, math.nan, note=f"no results of {', '.join(absent)}"), needs)
@@ -126,6 +126,23 @@ def _further_seeds(row: Row, evidence: Evidence, results: str) -> str:
         f"codesign-bench run --method {' '.join(methods)} --task {task} --seeds {seeds}{_profile(evidence)} "
         f"--out {results}"
     )
+
+
+def _filled(command: str, evidence: Evidence, results: str) -> str:
+    """Return a command of `Rule.needs` with its placeholders filled."""
+    first = evidence.first_seed
+    numbers = range(first, first + ALL_SEEDS)
+    return command.format(results=results, profile=_profile(evidence), seeds=_FirstSeeds(first), seed=numbers)
+
+
+@dataclass(frozen=True)
+class _FirstSeeds:
+    """`{seeds[6]}` is the value of `--seeds` for the first six seeds of a folder."""
+
+    first: int
+
+    def __getitem__(self, count: int) -> str:
+        return f"{self.first}-{self.first + count - 1}" if self.first else str(count)
 
 
 def _profile(evidence: Evidence) -> str:

@@ -35,7 +35,8 @@ def run_command(method: str, task: str, seeds: int, more: str = "") -> str:
 
     Finished cells are skipped, so claims about one task may share a command with `method` "all".
     """
-    return f"codesign-bench run --method {method} --task {task}{more} --seeds {seeds}{{profile}} --out {{results}}"
+    chosen = f"--seeds {{seeds[{seeds}]}}"
+    return f"codesign-bench run --method {method} --task {task}{more} {chosen}{{profile}} --out {{results}}"
 
 
 def effect_scale(evidence: Evidence, task: str, *sides: tuple[str, Variant]) -> float:

@@ -13,7 +13,16 @@ import pytest
 from codesign_bench import stats
 from codesign_bench.claims.claim import Claim, Rule
 from codesign_bench.claims.evidence import Evidence, load_evidence
-from codesign_bench.claims.finding import CEILING, CONTRADICTED, NOT_ASKED, SUPPORTED, UNDECIDED, Finding
+from codesign_bench.claims.finding import (
+    CEILING,
+    CONTRADICTED,
+    LEVEL,
+    NOT_ASKED,
+    SUPPORTED,
+    UNDECIDED,
+    Finding,
+    InsufficientData,
+)
 from codesign_bench.claims.judging import further_seeds, judge, missing
 from codesign_bench.claims.page import as_json, as_markdown, summary
 from codesign_bench.cli.program import build_parser
@@ -84,6 +93,38 @@ def test_two_looks_at_nothing_err_as_rarely_as_promised() -> None:
             wrong[looks] += looks * smallest < level
     assert wrong[1] / 2000 > 0.065, "reading twice as if once errs too often"
     assert wrong[2] / 2000 < 0.05
+
+
+@pytest.mark.parametrize("spread", [1.0, 0.3])
+@pytest.mark.parametrize("difference", [0.0, 1.0, 2.0, 4.0])
+def test_intervals_at_the_end_of_two_stages_contain_what_they_promise(difference: float, spread: float) -> None:
+    """Five seeds of each method, five more unless the first look decides one claim or the first of nine."""
+    rng, looks = np.random.default_rng(0), 2
+    first, second = rng.normal(difference, 1.0, (2000, 10)), rng.normal(0.0, spread, (2000, 10))
+    for family in (1, 9):
+        contained = 0
+        for one, other in zip(first, second, strict=True):
+            found = stats.welch(one[:5], other[:5])
+            if looks * family * found.p >= LEVEL:
+                found = stats.welch(one, other)
+            contained += found.low <= difference <= found.high
+        assert 0.92 < contained / 2000 < 0.97
+
+
+def test_missing_seeds_are_counted_from_the_first_that_is_there() -> None:
+    def lacking(evidence: Evidence, rng: np.random.Generator) -> Finding:
+        raise InsufficientData("nothing there")
+
+    needs = ("run --seeds {seeds[6]}{profile} --out {results}", "deploy --policy {results}/seed-{seed[1]:02d}")
+    asked = Claim("lacking", "", "", Rule("", "", "", needs, lacking))
+    frame = pd.DataFrame({"task": "push", "method": "gnn_ppo", "variant": "default", "seed": [102, 100, 101]})
+    cells = {"nothing": Evidence(), "reported": Evidence(evaluations=frame, profile="workstation")}
+    rows = {name: judge([asked], evidence, "here")[0] for name, evidence in cells.items()}
+    assert rows["nothing"].needs == ("run --seeds 6 --out here", "deploy --policy here/seed-01")
+    assert rows["reported"].needs == (
+        "run --seeds 100-105 --profile workstation --out here",
+        "deploy --policy here/seed-101",
+    )
 
 
 def test_what_the_scenes_were_chosen_for_is_a_check_of_them() -> None:

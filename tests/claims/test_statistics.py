@@ -95,5 +95,5 @@ def test_seeds_are_counted_in_words() -> None:
 
 def test_commands_leave_the_places_that_are_filled_in_later() -> None:
     command = run_command("all", "push", 6, " --alpha 0.3")
-    told = command.format(results="runs", profile=" --profile quick")
-    assert told == "codesign-bench run --method all --task push --alpha 0.3 --seeds 6 --profile quick --out runs"
+    filled = command.format(results="runs", profile=" --profile quick", seeds={6: "6"})
+    assert filled == "codesign-bench run --method all --task push --alpha 0.3 --seeds 6 --profile quick --out runs"

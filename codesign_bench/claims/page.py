@@ -67,12 +67,13 @@ def as_json(
         "left_out": list(left_out),
         "interval": {"confidence": stats.CONFIDENCE},
         "adjustment": {"method": "Holm", "level": LEVEL, "family": "claims of one rule that have a p-value"},
-        "claims": [_entry(row) for row in found],
-        "checks_of_scenes": [_entry(row) for row in checks],
+        "claims": [entry(row) for row in found],
+        "checks_of_scenes": [entry(row) for row in checks],
     }
 
 
-def _entry(row: Row) -> dict[str, Any]:
+def entry(row: Row) -> dict[str, Any]:
+    """Return everything that is known of one claim, as JSON values."""
     return {
         "name": row.claim.name,
         "sentence": row.claim.sentence,

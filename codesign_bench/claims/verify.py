@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from codesign_bench.claims import agreement
 from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.evidence import Evidence, load_evidence
 from codesign_bench.claims.judging import Row, further_seeds, judge, missing
@@ -19,6 +20,7 @@ from codesign_bench.storage.files import Outputs, json_bytes
 from codesign_bench.storage.places import shown
 
 MARKDOWN_FILE, JSON_FILE = "claims.md", "claims.json"
+AGREEMENT_MARKDOWN, AGREEMENT_JSON = "agreement.md", "agreement.json"
 
 
 def verify(
@@ -29,11 +31,13 @@ def verify(
     *,
     measure: bool = False,
     left_out: Sequence[str] = (),
+    compared: Path | None = None,
 ) -> None:
     """Judge the claims of a study on the results folder, print the table and write it into `out`.
 
     With `measure`, outcomes that claims need but cells do not have are measured first, which takes minutes. `left_out`
-    names the files that cannot be used; it is only written.
+    names the files that cannot be used; it is only written. `compared` is another results folder, on which the same
+    claims are judged and compared.
 
     Raises:
         UserError: there are no results, they cannot be read, or `out` is not writable.
@@ -44,11 +48,35 @@ def verify(
         _measure(claims, evidence, results, log)
         evidence = load_evidence(results)
     rows = judge(claims, evidence, shown(results))
-    made = provenance.differences({results.name: provenance.records_of(find_cells(results))})
+    made = _made(results)
     paths = write_rows(rows, study, results, out, made, left_out)
     print_rows(rows, console)
+    if compared is not None:
+        others = judge(claims, load_evidence(compared), shown(compared))
+        paths += _agreement(agreement.pairs(rows, others), study, results, compared, out, console)
     for line in (*made, *map(str, paths)):
         log(line)
+
+
+def _made(*folders: Path) -> list[str]:
+    """Return how the cells of the folders were made otherwise."""
+    return provenance.differences({shown(folder): provenance.records_of(find_cells(folder)) for folder in folders})
+
+
+def _agreement(
+    found: Sequence[agreement.Pair], study: Claimant, here: Path, there: Path, out: Path, console: Console
+) -> list[Path]:
+    """Print the claims that two results decide differently, write all into `out` and return the paths."""
+    given = study, here, there, _made(here, there)
+    paths = [out / AGREEMENT_JSON, out / AGREEMENT_MARKDOWN]
+    with Outputs(f"--out {out}") as outputs:
+        outputs.write(paths[0], json_bytes(agreement.as_json(found, *given)))
+        outputs.write(paths[1], agreement.as_markdown(found, *given))
+    differing = [pair.texts for pair in found if pair.agreement != agreement.SAME]
+    if differing:
+        print_table(console, agreement.HEADER, differing)
+    printer(console)(f"here is {shown(here)}, there is {shown(there)}; {agreement.summary(found)}")
+    return paths
 
 
 def _measure(claims: Sequence[Claim], evidence: Evidence, results: Path, log: Log) -> None:

@@ -6,8 +6,9 @@ import argparse
 
 from rich.console import Console
 
-from codesign_bench.cli.arguments import DEFAULT_CLAIMS, add_out, add_results, add_study
+from codesign_bench.cli.arguments import DEFAULT_CLAIMS, add_out, add_results, add_study, path
 from codesign_bench.console import tell_left_out
+from codesign_bench.storage.places import REFERENCE
 from codesign_bench.study import load_study
 
 HELP = "check which claims of a study the results support"
@@ -21,6 +22,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--measure", action="store_true", help="first run the extra episodes that some claims need; takes minutes"
     )
+    parser.add_argument(
+        "--compare",
+        type=path,
+        metavar="RESULTS",
+        help="also judge the claims on these results, e.g. of another machine, and say which verdicts agree: a folder, "
+        f"an archive of `pack`, or `{REFERENCE}`",
+    )
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -31,9 +39,20 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from codesign_bench.storage.survey import lines, survey
 
     results = results_folder(options.results)
+    compared = None if options.compare is None else results_folder(options.compare, must_exist=True)
     if options.measure:
         refuse_archive(results)
     left_out = lines(results, survey(results))
     tell_left_out(left_out)
-    verify(load_study(options.study), results, options.out, console, measure=options.measure, left_out=left_out)
+    if compared is not None:
+        tell_left_out(lines(compared, survey(compared)))
+    verify(
+        load_study(options.study),
+        results,
+        options.out,
+        console,
+        measure=options.measure,
+        left_out=left_out,
+        compared=compared,
+    )
     return 0

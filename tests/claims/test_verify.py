@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from codesign_bench.claims.agreement import SAME
 from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.finding import SUPPORTED, Finding
-from codesign_bench.claims.verify import JSON_FILE, MARKDOWN_FILE, verify
+from codesign_bench.claims.verify import AGREEMENT_JSON, AGREEMENT_MARKDOWN, JSON_FILE, MARKDOWN_FILE, verify
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from evidence import claim, make_results, study_of
@@ -43,3 +44,15 @@ def test_data_are_measured_where_asked_and_what_cannot_be_is_named(
     assert {entry["name"]: entry["verdict"] for entry in content["claims"]}["one"] == SUPPORTED
     assert content["left_out"] == ["a file"]
     assert "- a file" in (tmp_path / "out" / MARKDOWN_FILE).read_text()
+
+
+def test_verdicts_on_two_results_are_written_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("here", "there"):
+        make_results(tmp_path / name)
+    study = study_of([claim("one", Finding(SUPPORTED, 1.0)), claim("lacking", None)])
+    verify(study, tmp_path / "here", tmp_path / "out", Console(), compared=tmp_path / "there")
+    told = capsys.readouterr().out
+    assert "1 claims with data in both: 0 opposite, 0 decided here, 0 decided there, 0 other verdict, 1 same" in told
+    content = json.loads((tmp_path / "out" / AGREEMENT_JSON).read_text())
+    assert [(entry["name"], entry["agreement"]) for entry in content["claims"]] == [("one", SAME)]
+    assert "| one | same | supported | supported |" in (tmp_path / "out" / AGREEMENT_MARKDOWN).read_text()

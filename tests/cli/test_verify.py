@@ -48,6 +48,15 @@ def test_verify_prints_and_writes_a_row_for_each_claim(tmp_path: Path, capsys: p
     assert {claim.name for claim in CLAIMS if claim.sentence in page} == set(rows)
 
 
+def test_two_results_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    make_results(tmp_path / "runs")
+    given = ["verify", "--results", str(tmp_path / "runs"), "--out", str(tmp_path / "claims"), "--compare"]
+    assert main([*given, str(tmp_path / "runs")]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "claims" / "agreement.md")
+    assert main([*given, str(tmp_path / "nowhere")]) == 2
+    assert f"no results folder '{tmp_path / 'nowhere'}'" in capsys.readouterr().err
+
+
 def test_other_bad_input_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("")
     for results in (tmp_path / "nowhere", tmp_path):

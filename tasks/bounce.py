@@ -16,6 +16,7 @@ from codesign_bench.task import (
     Behaviour,
     Booleans,
     Box,
+    ByProfile,
     Floats,
     Given,
     Quantity,
@@ -217,6 +218,7 @@ class Bounce(Task):
         f"each ball has gone through the hoop or is below {LOST_HEIGHT:g} m, and not all have gone through"
     )
 
+    run_settings: ClassVar[ByProfile] = {"workstation": {"steps": 2_000_000}}
     outcome = Quantity("balls through the hoop", "balls")
     soundness = Soundness(
         overlap=STRIP_HALF_WIDTH,

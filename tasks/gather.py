@@ -15,6 +15,7 @@ from codesign_bench.task import (
     Behaviour,
     Booleans,
     Box,
+    ByProfile,
     Floats,
     Given,
     Quantity,
@@ -192,6 +193,7 @@ class Gather(Task):
     }
     success_steps = REST_STEPS
 
+    run_settings: ClassVar[ByProfile] = {"workstation": {"steps": 2_000_000}}
     outcome = Quantity("grains in the circle", "grains")
     soundness = Soundness(
         overlap=STRIP_HALF_WIDTH,

@@ -290,7 +290,7 @@ class Scoop(Task):
     run_settings: ClassVar[ByProfile] = {
         "quick": {"steps": 260_000},
         "laptop": {"steps": 600_000},
-        "workstation": {"steps": 1_500_000},
+        "workstation": {"steps": 1_000_000},
     }
     outcome = Quantity("balls held out of the reservoir", "balls")
     soundness = Soundness(overlap=MAX_BALL_SPEED * CLOCK.period, speed=MAX_BALL_SPEED, outcome_change=0.3, chaotic=True)

@@ -331,7 +331,7 @@ class Scoop3D(Task):
 
     run_settings: ClassVar[ByProfile] = {
         "laptop": {"steps": 500_000, "evaluations": 10},
-        "workstation": {"steps": 1_500_000},
+        "workstation": {"steps": 1_000_000},
     }
     outcome = Quantity("balls held above the line", "balls")
     max_slots = 18  # physics costs far more than a call of the policy: as fast as more, in less memory

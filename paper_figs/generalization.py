@@ -2,7 +2,9 @@
 
 The paper's claim: "As the area of the cutout region increases, the performance on unseen goals degrades gracefully and
 can still solve a significant portion of unseen tasks." Left: which starts are solved with one fraction cut out. Right:
-the return by region over the fractions. Starts outside the training region are drawn if they were evaluated.
+the return by region over the fractions, and what policies that saw everything earn on the starts of the cutout region:
+the paper lacks this line, without which an easy region looks like generalisation. Starts outside the training region
+are drawn if they were evaluated.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from codesign_bench.stats import MIN_SEEDS, mean, standard_error
 from codesign_bench.storage.frames import require_columns
 
 from ._order import task_order
-from ._style import GREEN, ORANGE, PAGE_WIDTH, PINK, Dashes, in_order, style
+from ._style import GREEN, GREY, ORANGE, PAGE_WIDTH, PINK, Dashes, in_order, style
 
 TITLE = "Generalisation to unseen goals"
 SOURCE = outcomes_by_region
@@ -30,15 +32,18 @@ NEEDED = (
 MAP_FRACTION = 0.6
 """The paper's fraction in the map; the nearest fraction in the results is drawn."""
 KEYS = ["task", "method", "label", "cutout", "region"]
+SEEN = "seen"
+"""Region of the numbers of policies that were trained on everything, on the starts of the cutout region."""
 PANEL_HEIGHT = 2.1
 """Height of a row of panels, in inches."""
 
 REGIONS: dict[str, tuple[str, Dashes, str, str]] = {
     "training": (GREEN, "-", "o", "training region"),
     "cutout": (ORANGE, "--", "s", "cutout region (unseen)"),
+    SEEN: (GREY, "-", "D", "cutout region, by policies trained on everything"),
     "outside": (PINK, "-.", "^", "outside the training region (unseen)"),
 }
-"""Regions: colour, dashes, marker and name."""
+"""Lines: colour, dashes, marker and name."""
 NOTE = f"right: mean over seeds; dots: each seed; bars: ± standard error, if {MIN_SEEDS} seeds or more"
 
 
@@ -49,8 +54,9 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
         frame: from `codesign_bench.figures.generalization`; fraction 0 is training on the whole region.
 
     Returns:
-        Columns task, method, label, cutout, region, return_mean, standard_error (NaN for fewer than three seeds),
-        success_rate, seeds, starts (evaluation instances in the region).
+        Columns task, method, label, cutout, region (`SEEN` for the cutout region as policies play it that were trained
+        on everything), return_mean, standard_error (NaN for fewer than three seeds), success_rate, seeds, starts
+        (evaluation instances in the region).
 
     Raises:
         UserError: a column, or every evaluation, is missing.
@@ -68,7 +74,8 @@ def data(frame: pd.DataFrame) -> pd.DataFrame:
 
 def _seeds(frame: pd.DataFrame) -> pd.DataFrame:
     """Return one row per region and seed, with the columns `KEYS`, seed, value (mean return), success, starts."""
-    grouped = _starts(frame).groupby([*KEYS, "seed"], as_index=False)
+    played = frame[frame["kind"] == "compared"].assign(region=SEEN)
+    grouped = pd.concat([_starts(frame), played]).groupby([*KEYS, "seed"], as_index=False)
     return grouped.agg(value=("return", "mean"), success=("success", "mean"), starts=("instance", "nunique"))
 
 
@@ -92,7 +99,7 @@ def draw(frame: pd.DataFrame) -> Figure:
             _draw_returns(right, part, single)
         shown = [REGIONS[region] for region in REGIONS if region in set(table["region"])]
         handles = [Line2D([], [], color=c, linestyle=d, marker=m, ms=3, label=text) for c, d, m, text in shown]
-        figure.legend(handles=handles, loc="outside lower center", ncols=3, title=NOTE, title_fontsize=5.5)
+        figure.legend(handles=handles, loc="outside lower center", ncols=2, title=NOTE, title_fontsize=5.5)
         figure.draw_without_rendering()
     return figure
 

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
 TRAINING, CUTOUT, OUTSIDE = "training", "cutout", "outside"
 """Regions of positions: training region, cutout region, and outside of both."""
-START, PLACE = "start", "place"
-"""Kinds of rows: an evaluation instance with its outcome, or a point of a fine grid that shows the regions."""
+START, COMPARED, PLACE = "start", "compared", "place"
+"""Kinds of rows: an evaluation instance with its outcome; an instance of a cutout region with the outcome of a policy
+that was trained on everything; or a point of a fine grid that shows the regions."""
 
 ROOM = 0.15
 """Margin of the grid around the training region, as a fraction of its extent."""
@@ -35,15 +36,18 @@ PLACES = 14_400
 def outcomes_by_region(request: Request) -> pd.DataFrame:
     """Return the evaluations of all cells with a cutout, and points that show the regions.
 
-    Cells of the same method and task that trained on the whole region are included as fraction 0. Results around the
-    training region, which are not part of evaluations, are included if they were measured.
+    Cells of the same method and task that trained on the whole region are included as fraction 0, and once more on each
+    cutout region: what a policy loses by not having seen a region is the distance from them, as some regions are easier
+    than others. Results around the training region, which are not part of evaluations, are included if they were
+    measured.
 
     Args:
         request: results folder and log; if the figure was named, missing results around the region are measured.
 
     Returns:
-        Rows of kind `START`: the columns of `load_evaluations`; rows of kind `PLACE`: task and cutout. Both have kind,
-        region, x and y (the position; y is NaN where positions have one entry), x_label, y_label.
+        Rows of kind `START` and `COMPARED`: the columns of `load_evaluations`, where cutout of `COMPARED` is the
+        fraction played on; rows of kind `PLACE`: task and cutout. All have kind, region, x and y (the position; y is
+        NaN where positions have one entry), x_label, y_label.
 
     Raises:
         UserError: no finished cell has a cutout.
@@ -59,7 +63,8 @@ def outcomes_by_region(request: Request) -> pd.DataFrame:
     for name, rows in pd.concat([inside, *_around(request, inside)]).groupby("task", sort=False):
         try:
             task = load_task(str(name))
-            parts.append(_starts(task, rows))
+            starts = _starts(task, rows)
+            parts += [starts, *_compared(starts)]
             parts += [_places(task, float(fraction)) for fraction in np.unique(rows["cutout"])]
         except UserError as error:
             request.log(f"generalisation on {name} left out: {error}")
@@ -107,6 +112,14 @@ def _starts(task: Task, rows: pd.DataFrame) -> pd.DataFrame:
         region = regions(task, instances, float(str(fraction)))
         parts.append(group.assign(kind=START, region=region, **_positions(task, instances)))
     return pd.concat(parts)
+
+
+def _compared(starts: pd.DataFrame) -> Iterator[pd.DataFrame]:
+    """Yield, for every method and fraction, what policies that were trained on everything do in the cutout region."""
+    for (method, fraction), own in starts[starts["region"] == CUTOUT].groupby(["method", "cutout"]):
+        everything = starts[(starts["method"] == method) & (starts["cutout"] == 0.0) & (starts["region"] == TRAINING)]
+        same = everything[everything["instance"].isin(own["instance"])]
+        yield same.assign(kind=COMPARED, region=CUTOUT, cutout=float(str(fraction)))
 
 
 def _places(task: Task, fraction: float) -> pd.DataFrame:

@@ -65,6 +65,9 @@ def test_evaluations_stand_in_their_regions_beside_a_grid_of_places(tmp_path: Pa
     area = places["region"].value_counts()
     assert area["cutout"] / (area["cutout"] + area["training"]) == pytest.approx(0.6, abs=0.02)
     assert places["x"].min() < -0.395 < 0.395 < places["x"].max()
+    compared = frame[frame["kind"] == "compared"]
+    assert compared[["cutout", "seed", "region"]].drop_duplicates().to_numpy().tolist() == [[0.6, 1, "cutout"]]
+    assert compared["instance"].tolist() == unseen["instance"].tolist()
 
 
 def test_positions_of_one_entry_have_no_y(tmp_path: Path) -> None:

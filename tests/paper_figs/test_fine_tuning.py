@@ -24,28 +24,31 @@ def results(seeds: int = 3) -> pd.DataFrame:
         for point in range(3):
             value = slope * point + 0.5 * seed + 10.0 * (start - 1)
             axes = {"finetune": np.nan, "scratch": np.nan, kind: float(start)}
-            rows.append(
-                ("fetch_cube", "gnn_ppo", f"{kind}-{start}", *axes.values(), seed, 1_000 * point, value, 40 * point)
-            )
-    rows.append(("fetch_cube", "gnn_ppo", "default", np.nan, np.nan, 0, 0, 99.0, 0))
-    columns = ["task", "method", "variant", "finetune", "scratch", "seed", "env_steps", "return_mean", "gradient_steps"]
-    return pd.DataFrame(rows, columns=columns)
+            steps = {"env_steps": 1_000 * point, "gradient_steps": 40 * point}
+            outcome = {"return_mean": value, "success_rate": point / 2 if kind == "finetune" else 0.0}
+            rows.append({"variant": f"{kind}-{start}", **axes, "seed": seed, **steps, **outcome})
+    rows.append({"variant": "default", "seed": 0, "env_steps": 0, "gradient_steps": 0, "return_mean": 99.0})
+    return pd.DataFrame(rows).assign(task="fetch_cube", method="gnn_ppo")
 
 
 def test_the_numbers_by_hand() -> None:
     table = figure.data(results())
     assert set(table["start"]) == {1, 2}
-    row = table[(table["start"] == 2) & (table["kind"] == "finetune") & (table["gradient_steps"] == 80)].iloc[0]
+    last = table[(table["start"] == 2) & (table["kind"] == "finetune") & (table["gradient_steps"] == 80)]
+    row = last.set_index("quantity").loc["return_mean"]
     assert row["mean"] == pytest.approx(4.0 + 0.5 + 10.0)  # Seeds add 0, 0.5 and 1.
     assert row["standard_error"] == pytest.approx(0.5 / np.sqrt(3.0))
     assert row["seeds"] == 3
     assert 99.0 not in table["mean"].to_list()
+    success = last.set_index("quantity").loc["success_rate"]
+    assert (success["mean"], success["standard_error"], success["seeds"]) == (1.0, 0.0, 3)
 
 
-def test_every_start_has_a_panel_with_both_kinds_and_no_band_below_three_seeds() -> None:
+def test_every_start_has_panels_with_both_kinds_and_no_band_below_three_seeds() -> None:
     drawn = figure.draw(results(seeds=2))
     panels = [axes for axes in drawn.axes if axes.get_visible()]
-    assert [axes.get_title() for axes in panels] == ["fetch cube, start 1", "fetch cube, start 2"]
+    assert [axes.get_title() for axes in panels] == ["fetch cube, start 1", "fetch cube, start 2", "", ""]
+    assert [axes.get_ylabel() for axes in panels] == ["mean return", "", "success rate", ""]
     for axes in panels:
         seeds = {f"{kind} seed {seed}" for kind in ("finetune", "scratch") for seed in range(2)}
         assert {line.get_gid() for line in axes.lines} == {"finetune", "scratch"} | seeds

@@ -95,6 +95,20 @@ def test_starts_outside_the_training_region_have_a_line_of_their_own() -> None:
     assert len(legend.get_texts()) == 3
 
 
+def test_policies_that_saw_everything_are_a_line_over_the_same_fractions() -> None:
+    seen = evaluations(0.6, 3).query("region == 'cutout'").assign(**{"kind": "compared", "return": 4.0})
+    frame = pd.concat([evaluations(0.6, 3), places(0.6), seen])
+    assert figure.data(frame).set_index("region").loc["seen", ["return_mean", "seeds", "starts"]].tolist() == [
+        4.0,
+        3,
+        1,
+    ]
+    left, right, *_ = figure.draw(frame).axes
+    assert np.asarray(bars(right)["seen"].lines[0].get_ydata()).tolist() == [4.0]
+    (starts,) = [found for found in left.collections if found.get_gid() == "starts"]
+    assert len(starts.get_offsets()) == 3, "the map has only what was trained without the region"
+
+
 def test_positions_on_a_line_are_drawn_over_the_share_of_seeds() -> None:
     left, *_ = figure.draw(pd.concat([evaluations(0.6, 3, flat=True), places(0.6, flat=True)])).axes
     (starts,) = [found for found in left.collections if found.get_gid() == "starts"]

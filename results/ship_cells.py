@@ -1,8 +1,8 @@
 """Copy finished cells into results that are shipped: `python results/ship_cells.py RUNS [SHIPPED]`.
 
 What only resuming needs stays behind. Of policies, every seed of the paper's method on the default variant and the
-lowest seed of everything else go along; `--all-policies` takes every one. A cell that is there already is left as it
-is.
+lowest seed of everything else go along; `--all-policies` takes every one. `--task` takes the cells of some tasks alone,
+e.g. those whose seeds are complete. A cell that is there already is left as it is.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import shutil
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 from codesign_bench.cell.variant import DEFAULT, Variant
@@ -38,14 +38,20 @@ def _kind(cell: CellRecord) -> tuple[str, str, Variant]:
     return cell.task, cell.method, cell.variant
 
 
-def ship(runs: Path, shipped: Path, all_policies: bool = False) -> list[Path]:
+def ship(runs: Path, shipped: Path, all_policies: bool = False, tasks: Collection[str] | None = None) -> list[Path]:
     """Copy the finished cells of `runs` that `shipped` lacks and return their folders there.
+
+    Args:
+        runs: results folder.
+        shipped: results folder; made if there is none.
+        all_policies: take the policy of every cell.
+        tasks: names of the tasks whose cells are taken; None: all.
 
     Raises:
         UserError: `runs` is no results folder, or `shipped` cannot be one.
     """
     copied = []
-    cells = [cell for cell in reported_cells(runs) if cell.is_done]
+    cells = [cell for cell in reported_cells(runs) if cell.is_done and (tasks is None or cell.record.task in tasks)]
     records = [cell.record for cell in cells]
     open_folder(shipped)
     for cell in cells:
@@ -66,9 +72,10 @@ def main() -> int:
     parser.add_argument("runs", type=Path, metavar="RUNS")
     parser.add_argument("shipped", type=Path, metavar="SHIPPED", nargs="?", default=REFERENCE)
     parser.add_argument("--all-policies", action="store_true")
+    parser.add_argument("--task", nargs="+", metavar="T")
     arguments = parser.parse_args()
     try:
-        copied = ship(arguments.runs, arguments.shipped, arguments.all_policies)
+        copied = ship(arguments.runs, arguments.shipped, arguments.all_policies, arguments.task)
     except UserError as error:
         print(error, file=sys.stderr)
         return 2

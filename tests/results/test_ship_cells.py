@@ -63,6 +63,11 @@ def test_every_policy_goes_along_on_demand(runs: Path, tmp_path: Path) -> None:
     assert files(tmp_path / "shipped" / BASELINE) == {*RECORDS, "policy.safetensors"}
 
 
+def test_tasks_go_along_one_by_one(runs: Path, tmp_path: Path) -> None:
+    assert ship(runs, tmp_path / "shipped", "--task", "catch_balls", "scoop").stdout == "nothing new\n"
+    assert len(ship(runs, tmp_path / "shipped", "--task", "scoop", "push").stdout.split()) == 4
+
+
 def test_unfinished_cells_stay_and_go_when_they_are_done(runs: Path, tmp_path: Path) -> None:
     shipped = tmp_path / "shipped"
     record = CellRecord.read(runs / SECOND)

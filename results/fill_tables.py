@@ -56,6 +56,7 @@ PAGES = {
 }
 """Every page and the results, or the folder of archives, that its tables show."""
 PAPERS_METHOD = "gnn_ppo"
+ARCHITECTURES = (PAPERS_METHOD, "shared_arch")
 SEPARATE = Variant.of(credit="separate")
 NOT_MEASURED = "Reference points of these results are not measured yet.\n"
 TABLE = re.compile(r"(<!-- (?P<name>\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -117,27 +118,51 @@ def _both(task: str, scripted: pd.Series[float], learned: pd.Series[float]) -> s
 
 def _response(results: Path) -> str:
     """Return what a separate credit, and then the response term of `stackelberg_ppo`, add to success on each task."""
-    last = final_values(_curves(results), "success_rate")
-
-    def of(task: str, method: str, variant: Variant) -> np.ndarray:
-        rows = last[(last["task"] == task) & (last["method"] == method) & (last["variant"] == variant.name)]
-        return rows["success_rate"].to_numpy()
-
     steps = ((PAPERS_METHOD, DEFAULT), (PAPERS_METHOD, SEPARATE), ("stackelberg_ppo", DEFAULT))
-    found = {task: [of(task, *step) for step in steps] for task in in_order("tasks", set(last["task"]))}
-    found = {task: samples for task, samples in found.items() if all(len(sample) for sample in samples)}
+    found = _successes(results, steps)
     lines = [
-        [
-            task.replace("_", " "),
-            *(f"{sample.mean():.2f} ({', '.join(f'{value:.2f}' for value in sample)})" for sample in samples),
-            *(_difference([pair]) for pair in _added(samples)),
-        ]
+        [task.replace("_", " "), *map(_seeds, samples), *(_difference([pair]) for pair in _added(samples))]
         for task, samples in found.items()
     ]
     credits, responses = zip(*map(_added, found.values()), strict=True)
     lines.append([f"mean of {len(found)} tasks", "", "", "", _difference(credits), _difference(responses)])
     header = ["task", "joint credit", "separate credit", "separate credit and response", "credit adds", "response adds"]
     return markdown(header, lines)
+
+
+def _credit(results: Path) -> str:
+    """Return what a separate credit adds to the success of either architecture on each task."""
+    lines = []
+    for method in ARCHITECTURES:
+        found = _successes(results, ((method, DEFAULT), (method, SEPARATE)))
+        added = [pair for samples in found.values() for pair in _added(samples)]
+        lines += [
+            [f"`{method}`", task.replace("_", " "), *map(_seeds, samples), _difference([pair])]
+            for (task, samples), pair in zip(found.items(), added, strict=True)
+        ]
+        if len(added) > 1:
+            lines.append([f"`{method}`", f"mean of {len(added)} tasks", "", "", _difference(added)])
+    return markdown(["method", "task", "joint credit", "separate credit", "separate credit adds"], lines)
+
+
+def _successes(results: Path, sides: Sequence[tuple[str, Variant]]) -> dict[str, list[np.ndarray]]:
+    """Return each seed's success at the end of training for every side, (method, variant), on the tasks of all."""
+    last = final_values(_curves(results), "success_rate")
+    found = {}
+    for task in in_order("tasks", set(last["task"])):
+        rows = last[last["task"] == task]
+        samples = [
+            rows.loc[(rows["method"] == method) & (rows["variant"] == variant.name), "success_rate"].to_numpy()
+            for method, variant in sides
+        ]
+        if all(len(sample) for sample in samples):
+            found[task] = samples
+    return found
+
+
+def _seeds(sample: np.ndarray) -> str:
+    """Return the mean of a sample, and every seed."""
+    return f"{sample.mean():.2f} ({', '.join(f'{value:.2f}' for value in sample)})"
 
 
 def _added(samples: Sequence[np.ndarray]) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
@@ -219,6 +244,7 @@ MAKERS: dict[str, Callable[[Path], str]] = {
     "reference_points": _reference_points,
     "script": _script,
     "response": _response,
+    "credit": _credit,
     "search": _search,
     "leaderboard": lambda folder: leaderboard(folder, "../results/submissions"),
     "budgets": lambda _: _budgets(),

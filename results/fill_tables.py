@@ -19,6 +19,7 @@ import pandas as pd
 
 from codesign_bench.cell.variant import DEFAULT, Variant
 from codesign_bench.claims.evidence import load_evidence
+from codesign_bench.claims.finding import probability
 from codesign_bench.claims.judging import Row, judge
 from codesign_bench.claims.page import by_rule, contradicted
 from codesign_bench.config.profiles import BUILT_IN
@@ -229,7 +230,8 @@ def _search(results: Path) -> str:
 def _difference(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
     """Return the mean difference within pairs, with Welch's interval and p-value."""
     found = welch_across(pairs)
-    return f"{found.value:+.2f} [{found.low:.2f}, {found.high:.2f}], p {found.p:.2f}"
+    p = probability(found.p)
+    return f"{found.value:+.2f} [{found.low:.2f}, {found.high:.2f}], p {p if p.startswith('<') else f'= {p}'}"
 
 
 @lru_cache

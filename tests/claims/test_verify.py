@@ -51,8 +51,8 @@ def test_verdicts_on_two_results_are_written_side_by_side(tmp_path: Path, capsys
         make_results(tmp_path / name)
     study = study_of([claim("one", Finding(SUPPORTED, 1.0)), claim("lacking", None)])
     verify(study, tmp_path / "here", tmp_path / "out", Console(), compared=tmp_path / "there")
-    told = capsys.readouterr().out
-    assert "1 claims with data in both: 0 opposite, 0 decided here, 0 decided there, 0 other verdict, 1 same" in told
+    printed = capsys.readouterr().out
+    assert "1 claims with data in both: 0 opposite, 0 decided here, 0 decided there, 0 other verdict, 1 same" in printed
     content = json.loads((tmp_path / "out" / AGREEMENT_JSON).read_text())
     assert [(entry["name"], entry["agreement"]) for entry in content["claims"]] == [("one", SAME)]
     assert "| one | same | supported | supported |" in (tmp_path / "out" / AGREEMENT_MARKDOWN).read_text()

@@ -1,7 +1,8 @@
 """Tools and policies on a simulated robot arm (the paper's `tab:real_exp` and `fig:detailed_other_inits_results`).
 
 Top: successes of each tool on the instance it was designed for and on the grid of starts, with the paper's real robot
-in brackets. Bottom: the grid of each fetch-cube tool, seen from above, with the robot's base at the bottom.
+in brackets. Bottom: the grid of each fetch-cube tool, seen from above, with the robot's base at the bottom. Where
+several policies were deployed, every field has one strip for each, in the order of their seeds.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ NEAR = ("#E69F00", "n", f"failure within {100.0 * REAL_ROBOT.near_miss:.0f} cm o
 FAILURE = ("#D55E00", "F", "failure")
 """Green, orange and red of Okabe and Ito (2008), each with a letter for readers who cannot distinguish them."""
 ROW_NAMES = {OWN: "own instance", GRID: "grid of starts"}
-NOTE = "Successes on the simulated arm (in brackets: the paper's, on the real one)"
+SEED = "policy_seed"
+NOTE = "Successes on the simulated arm{policies} (in brackets: the paper's, on the real one)"
 TABLE_HEIGHT, MAP_HEIGHT = 1.1, 1.8
 """In inches."""
 BASE_ROOM = 1.1
@@ -71,6 +73,8 @@ def draw(frame: pd.DataFrame) -> Figure:
     """
     header, cells = _cells(data(frame))
     grid = frame[(frame["task"] == GRID_TASK) & (frame["kind"] == GRID)]
+    if SEED in grid.columns:
+        grid = grid.sort_values(SEED, kind="stable")
     tools = sorted(grid["tool"].unique().tolist())
     with style():
         figure = Figure(figsize=(PAGE_WIDTH, TABLE_HEIGHT + (MAP_HEIGHT if tools else 0.0)), layout="constrained")
@@ -78,7 +82,7 @@ def draw(frame: pd.DataFrame) -> Figure:
         top, *below = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
         axes = top.subplots()
         draw_table(axes, header, cells)
-        axes.set_title(NOTE, fontsize=7)
+        axes.set_title(_note(frame), fontsize=7)
         if tools:
             (bottom,) = below
             maps = bottom.subplots(1, len(tools), squeeze=False)[0]
@@ -151,14 +155,30 @@ def _success(row: pd.Series) -> str:
     return f"{int(row['successes'])}/{int(row['trials'])}{paper}"
 
 
+def _note(frame: pd.DataFrame) -> str:
+    """Return the title of the table, which says how many policies of a task share its numbers."""
+    seeds = int(frame.groupby("task")[SEED].nunique().max()) if SEED in frame.columns else 1
+    return NOTE.format(policies=f" of {seeds} policies each" if seeds > 1 else "")
+
+
 def _draw_map(axes: Axes, trials: pd.DataFrame, tool: int) -> None:
-    """Draw the grid of one tool, with the row farthest from the robot at the top and the base at the bottom."""
+    """Draw the grid of one tool, with the row farthest from the robot at the top and the base at the bottom.
+
+    A field has one strip per trial, in the order of the policies' seeds.
+    """
     rows, columns = int(trials["row"].max()) + 1, int(trials["column"].max()) + 1
-    for entry in trials.to_dict("records"):
-        colour, letter, _ = SUCCESS if entry["success"] else NEAR if entry["near"] else FAILURE
-        x, y = float(entry["column"]), float(rows - 1 - entry["row"])
-        axes.add_patch(Rectangle((x, y), 1.0, 1.0, facecolor=colour, edgecolor="black", linewidth=0.6))
-        axes.text(x + 0.5, y + 0.5, letter, ha="center", va="center", fontsize=7)
+    for (row, column), field in trials.groupby(["row", "column"]):
+        x, y = float(column), float(rows - 1 - row)
+        width = 1.0 / len(field)
+        kinds = [
+            SUCCESS if success else NEAR if near else FAILURE
+            for success, near in zip(field["success"], field["near"], strict=True)
+        ]
+        for strip, (colour, _, _) in enumerate(kinds):
+            axes.add_patch(Rectangle((x + strip * width, y), width, 1.0, facecolor=colour, linewidth=0.0))
+        axes.add_patch(Rectangle((x, y), 1.0, 1.0, fill=False, edgecolor="black", linewidth=0.6))
+        text = kinds[0][1] if len(kinds) == 1 else f"{kinds.count(SUCCESS)}/{len(kinds)}"
+        axes.text(x + 0.5, y + 0.5, text, ha="center", va="center", fontsize=7)
     axes.add_patch(Circle((0.5 * columns, -0.45), 0.3, facecolor="black"))
     axes.text(0.5 * columns + 0.45, -0.45, "base", ha="left", va="center", fontsize=6)
     axes.set_xlim(0.0, columns)

@@ -99,11 +99,10 @@ def timing(request: Request) -> pd.DataFrame:
 
 
 def trials_on_an_arm(request: Request) -> pd.DataFrame:
-    """Return the trials of one deployed policy for each task, that of the lowest seed."""
-    from codesign_bench.deployment.tables import SEED, load_deployment
+    """Return the trials of every deployed policy."""
+    from codesign_bench.deployment.tables import load_deployment
 
-    trials = load_deployment(request.results)
-    return trials[trials[SEED] == trials.groupby("task")[SEED].transform("min")]
+    return load_deployment(request.results)
 
 
 def tasks_shown(request: Request) -> list[str]:

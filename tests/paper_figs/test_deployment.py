@@ -67,7 +67,7 @@ def test_maps_have_the_far_row_on_top_the_base_below_and_a_letter_besides_the_co
     maps = [axes for axes in figure.axes if axes.get_title().startswith("tool ")]
     assert [axes.get_title() for axes in maps] == ["tool 1: 2 of 12", "tool 2: 1 of 12"]
     for tool, axes in enumerate(maps, start=1):
-        fields = [patch for patch in axes.patches if isinstance(patch, Rectangle)]
+        fields = [patch for patch in axes.patches if isinstance(patch, Rectangle) and patch.get_fill()]
         letters = {text.get_position(): text.get_text() for text in axes.texts}
         assert len(fields) == 12
         for field in fields:
@@ -91,3 +91,19 @@ def test_trials_that_lack_a_column_are_refused(frame: pd.DataFrame) -> None:
         deployment.data(frame.drop(columns="near"))
     with pytest.raises(UserError, match="have no rows"):
         deployment.data(frame.iloc[:0])
+
+
+def test_several_policies_share_a_field_and_their_successes_are_summed(frame: pd.DataFrame) -> None:
+    other = frame.assign(success=1, near=0)
+    both = pd.concat([other.assign(policy_seed=101), frame.assign(policy_seed=100)])
+    table = deployment.data(both)
+    assert table["trials"].tolist() == [10, 10, 24, 24, 10]
+    assert table["successes"].tolist() == [1 + 5, 2 + 5, 2 + 12, 1 + 12, 5 + 5]
+    figure = deployment.draw(both)
+    assert "of 2 policies each" in figure.axes[0].get_title()
+    (one,) = [axes for axes in figure.axes if axes.get_title() == "tool 1: 14 of 24"]
+    texts = {text.get_position(): text.get_text() for text in one.texts}
+    assert texts[(0.5, 0.5)] == "2/2", "row 2, column 0: both policies solve it"
+    assert texts[(0.5, 2.5)] == "1/2", "row 0, column 0: the second one alone"
+    strips = {patch.get_xy(): to_hex(patch.get_facecolor()) for patch in one.patches if isinstance(patch, Rectangle)}
+    assert strips[(0.5, 2.0)] == deployment.SUCCESS[0].lower(), "strips lie in the order of the seeds"

@@ -6,6 +6,8 @@ of goals that each random tool solves, compared with the best single tool and wi
 
 from __future__ import annotations
 
+from textwrap import fill
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -26,6 +28,8 @@ PANELS_PER_ROW = 3
 PANEL_HEIGHT = 1.5
 """Height of a panel, in inches."""
 BINS = 16
+LABEL_WIDTH = 34
+"""Characters to a line of the label of a colour bar."""
 
 MARKS: dict[str, tuple[str, Dashes, str]] = {
     "best_single": (RED, "-", "best single tool"),
@@ -121,7 +125,8 @@ def _draw_matrix(figure: Figure, axes: Axes, rows: pd.DataFrame) -> None:
     axes.set_ylabel(f"{len(goals)} goals")
     bar = figure.colorbar(image, ax=axes, pad=0.02)
     name, unit = rows["outcome_name"].iloc[0], rows["outcome_unit"].iloc[0]
-    bar.set_label(str(name) if unit == "1" else f"{name} ({unit})", fontsize=5)
+    label = str(name) if unit == "1" else f"{name} ({unit})"
+    bar.set_label(fill(label, LABEL_WIDTH), fontsize=5)
     bar.ax.tick_params(labelsize=5)
 
 

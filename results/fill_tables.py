@@ -45,9 +45,9 @@ SUBMISSIONS = ROOT / "results" / "submissions"
 SEARCH = ROOT / "results" / "search"
 PLATEAU = ROOT / "results" / "plateau"
 PAGES = {
-    ROOT / "docs" / "results.md": REFERENCE,
-    ROOT / "docs" / "reference_points.md": REFERENCE,
-    ROOT / "docs" / "budgets.md": REFERENCE,
+    ROOT / "docs" / "results.md": WORKSTATION,
+    ROOT / "docs" / "reference_points.md": WORKSTATION,
+    ROOT / "docs" / "budgets.md": WORKSTATION,
     ROOT / "docs" / "leaderboard.md": SUBMISSIONS,
     REFERENCE / "README.md": REFERENCE,
     LONGER / "README.md": LONGER,

@@ -18,7 +18,8 @@ from conf import GITHUB, REPOSITORY, UNPUBLISHED
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 RESULTS = ROOT / "results"
-REFERENCE = RESULTS / "reference"
+SHOWN = RESULTS / "workstation"
+"""The results whose numbers the tables show."""
 HAND_WRITTEN = DOCS / "site" / "pages"
 
 CODE = re.compile(r"^(?P<fence>`{3,}).*?^(?P=fence) *$", re.MULTILINE | re.DOTALL)

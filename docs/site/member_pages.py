@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import inspect
 
-from assemble import REFERENCE, ROOT, title_of
+from assemble import ROOT, SHOWN, title_of
 from codesign_bench.method import load_method, method_names
 from codesign_bench.registry import built_in, load_module
 from codesign_bench.study import DEFAULT_STUDY, load_study
@@ -44,7 +44,7 @@ def methods() -> str:
     paper, beyond = (rows[: len(load_study(DEFAULT_STUDY).methods)], rows[len(load_study(DEFAULT_STUDY).methods) :])
     lead = (
         "The last column is the mean over tasks of the [normalised score](docs/reference_points.md#normalised-scores) "
-        "at the end of training in the [shipped results](results/reference/README.md), with its 95 % interval."
+        "at the end of training in the [shipped results](results/workstation/README.md), with its 95 % interval."
     )
     extra = sorted(
         path.stem for path in (ROOT / "docs" / "methods").glob("*.md") if path.stem not in built_in("methods")
@@ -71,7 +71,7 @@ def told_by_module(name: str) -> tuple[str, str]:
 
 def final_results() -> list[dict[str, str]]:
     """Return the rows of the shipped figure of final results."""
-    with (REFERENCE / "figures" / "final_results.csv").open(encoding="utf-8") as file:
+    with (SHOWN / "figures" / "final_results.csv").open(encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 

@@ -167,8 +167,8 @@ def _draw_map(axes: Axes, trials: pd.DataFrame, tool: int) -> None:
     A field has one strip per trial, in the order of the policies' seeds.
     """
     rows, columns = int(trials["row"].max()) + 1, int(trials["column"].max()) + 1
-    for (row, column), field in trials.groupby(["row", "column"]):
-        x, y = float(column), float(rows - 1 - row)
+    for _, field in trials.groupby(["row", "column"]):
+        x, y = float(field["column"].iloc[0]), float(rows - 1 - int(field["row"].iloc[0]))
         width = 1.0 / len(field)
         kinds = [
             SUCCESS if success else NEAR if near else FAILURE

@@ -79,6 +79,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     conditions = replace(TRIAL if options.protocol else Conditions(), **given)
     conditions.check()
     policy, task = policy_and_task(options.policy, options.task)
+    cell = open_cell(options.policy)
     order = Order(
         conditions,
         tools=tuple(options.tool),
@@ -86,7 +87,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         protocol=options.protocol,
         seed=options.seed,
         gifs=not options.no_gifs,
-        policy_seed=open_cell(options.policy).record.seed,
+        policy_seed=cell.record.seed,
     )
-    deploy(task, policy, order, options.out, printer(console), str(options.policy))
+    deploy(task, policy, order, options.out, printer(console), cell.name)
     return 0

@@ -60,7 +60,7 @@ def deploy(
         order: the trials to run.
         out: a results folder; files are written to `out`/deployment/<task>.
         say: prints a line.
-        source: source of the policy, for the summary.
+        source: name of the policy's cell, for the summary.
 
     Raises:
         UserError: the task cannot be deployed, a number of `order` is invalid, or a file cannot be written;

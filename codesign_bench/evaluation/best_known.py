@@ -24,7 +24,7 @@ from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.evaluation.expected import Work, steps_per_second
-from codesign_bench.evaluation.headroom import DESIGNER, SearchBudget, Sigma, fingerprint, name_of
+from codesign_bench.evaluation.headroom import DESIGNER, SearchBudget, Sigma, fingerprint
 from codesign_bench.evaluation.plans import plans_of, replay
 from codesign_bench.learning.cma_es import Evolution, EvolutionConfig
 from codesign_bench.seeding import generator
@@ -157,7 +157,7 @@ def expected_work(task: Task, cells: Sequence[StoredCell], search: Search, *, in
 
 def _take_from(cell: StoredCell, results: Path, state: Update, log: Log) -> None:
     """Play a cell's policy where it may be better than what is known, with its own tools and with those of headroom."""
-    task, source = state.task, name_of(cell)
+    task, source = state.task, cell.name
     try:
         reason, own = misfit(cell), cell.evaluation()
     except UserError as error:

@@ -19,7 +19,6 @@ from typing import Annotated, Any
 import numpy as np
 from joblib import Parallel, delayed
 
-from codesign_bench.cell.cell import Cell
 from codesign_bench.config.validation import check_values
 from codesign_bench.config.values import Within
 from codesign_bench.console import Log
@@ -149,7 +148,7 @@ def measure_cell(
     missing = _missing(cell, policy_name, controller, results, budget, instances)
     if missing:
         work = _work(controller, len(missing), budget, jobs).line()
-        log(f"trying other tools on {len(missing)} instances of {name_of(cell)}: {work}; kept in {path}")
+        log(f"trying other tools on {len(missing)} instances of {cell.name}: {work}; kept in {path}")
         tools = controller.designs()
         calls = (delayed(_measure)(folder, policy_name, tools, index, budget) for index in missing)
         try:
@@ -364,8 +363,3 @@ def _refuse_other(path: Path, rows: list[dict[str, Any]], wanted: dict[str, Any]
     }
     if found:
         raise UserError(f"{path} was measured otherwise ({'; '.join(sorted(found))}); choose another --results folder")
-
-
-def name_of(cell: StoredCell) -> str:
-    """Return a cell's identifier, its path below a results folder."""
-    return Cell(cell.record.task, cell.record.method, cell.record.seed, cell.record.variant).name

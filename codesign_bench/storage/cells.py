@@ -69,6 +69,11 @@ class StoredCell:
     folder: Path
     record: CellRecord
 
+    @property
+    def name(self) -> str:
+        """Its path below a results folder, e.g. `push/gnn_ppo/default/seed-00`."""
+        return _name(self.record)
+
     @cached_property
     def status(self) -> str:
         """`DONE`, `FAILED`, `RUNNING`, `INTERRUPTED` or `DAMAGED`."""
@@ -279,7 +284,7 @@ def _check_place(record: CellRecord, folder: Path, name: str) -> None:
     Raises:
         DamagedFile: it is another cell's.
     """
-    own = Cell(record.task, record.method, record.seed, record.variant).name
+    own = _name(record)
     if own != name:
         raise DamagedFile(folder / CELL_FILE, f"it is that of the cell {own}, so it is a copy and does not count")
 
@@ -287,3 +292,7 @@ def _check_place(record: CellRecord, folder: Path, name: str) -> None:
 def _lacks_its_record(folder: Path) -> bool:
     """Return whether a folder without a cell file has files that only a cell has, while no process runs it."""
     return any(is_there(folder / name) for name in OF_A_CELL) and not is_locked(folder)
+
+
+def _name(record: CellRecord) -> str:
+    return Cell(record.task, record.method, record.seed, record.variant).name

@@ -55,10 +55,10 @@ def deploy(results: Path, profile: str, log: Log) -> None:
         finished = {record.seed for record in done if (record.task, record.method, record.variant) == wanted}
         for seed in sorted(finished or ONE_SEED):
             if not (results / FOLDER / task_name / protocol_file(seed)).exists():
-                folder = Cell(task_name, OURS, seed=seed, profile=profile).folder(results)
-                policy, task = policy_and_task(folder, task_name)
+                cell = Cell(task_name, OURS, seed=seed, profile=profile)
+                policy, task = policy_and_task(cell.folder(results), task_name)
                 order = Order(TRIAL, protocol=True, gifs=False, policy_seed=seed)
-                play_trials(task, policy, order, results, log, str(folder))
+                play_trials(task, policy, order, results, log, cell.name)
 
 
 EXPERIMENTS: Mapping[str, Experiment] = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -68,7 +69,10 @@ def test_the_trials_on_an_arm_are_played_once_with_whatever_seed_is_finished(
         return console.export_text()
 
     assert "own-tool-1-trial-1: " in played()
-    assert len(pd.read_csv(tmp_path / "deployment" / "lift_cup" / table)) == 4 * 5
+    trials = tmp_path / "deployment" / "lift_cup" / table
+    assert len(pd.read_csv(trials)) == 4 * 5
+    policy = json.loads(trials.with_suffix(".json").read_text(encoding="utf-8"))["policy"]
+    assert policy == cell.as_posix(), "the cell's name, not where this machine has it"
     assert "own-tool-1-trial-1: " not in played()
 
 

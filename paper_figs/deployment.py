@@ -157,8 +157,10 @@ def _success(row: pd.Series) -> str:
 
 def _note(frame: pd.DataFrame) -> str:
     """Return the title of the table, which says how many policies of a task share its numbers."""
-    seeds = int(frame.groupby("task")[SEED].nunique().max()) if SEED in frame.columns else 1
-    return NOTE.format(policies=f" of {seeds} policies each" if seeds > 1 else "")
+    counts = frame.groupby("task")[SEED].nunique() if SEED in frame.columns else pd.Series([1])
+    fewest, most = int(counts.min()), int(counts.max())
+    number = str(most) if fewest == most else f"{fewest} to {most}"
+    return NOTE.format(policies=f" of {number} policies each" if most > 1 else "")
 
 
 def _draw_map(axes: Axes, trials: pd.DataFrame, tool: int) -> None:

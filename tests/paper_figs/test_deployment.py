@@ -101,6 +101,8 @@ def test_several_policies_share_a_field_and_their_successes_are_summed(frame: pd
     assert table["successes"].tolist() == [1 + 5, 2 + 5, 2 + 12, 1 + 12, 5 + 5]
     figure = deployment.draw(both)
     assert "of 2 policies each" in figure.axes[0].get_title()
+    fewer = both[(both["task"] == "fetch_cube") | (both["policy_seed"] == 100)]
+    assert "of 1 to 2 policies each" in deployment.draw(fewer).axes[0].get_title(), "lift cup has one"
     (one,) = [axes for axes in figure.axes if axes.get_title() == "tool 1: 14 of 24"]
     texts = {text.get_position(): text.get_text() for text in one.texts}
     assert texts[(0.5, 0.5)] == "2/2", "row 2, column 0: both policies solve it"

@@ -38,21 +38,17 @@ from codesign_bench.tuning.scores import mean_ranks
 
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "results" / "reference"
-LONGER = ROOT / "results" / "longer"
 ALL_METHODS = ROOT / "results" / "all_methods"
-WORKSTATION = ROOT / "results" / "workstation"
 SUBMISSIONS = ROOT / "results" / "submissions"
 SEARCH = ROOT / "results" / "search"
 PLATEAU = ROOT / "results" / "plateau"
 PAGES = {
-    ROOT / "docs" / "results.md": WORKSTATION,
-    ROOT / "docs" / "reference_points.md": WORKSTATION,
-    ROOT / "docs" / "budgets.md": WORKSTATION,
+    ROOT / "docs" / "results.md": REFERENCE,
+    ROOT / "docs" / "reference_points.md": REFERENCE,
+    ROOT / "docs" / "budgets.md": REFERENCE,
     ROOT / "docs" / "leaderboard.md": SUBMISSIONS,
     REFERENCE / "README.md": REFERENCE,
-    LONGER / "README.md": LONGER,
     ALL_METHODS / "README.md": ALL_METHODS,
-    WORKSTATION / "README.md": WORKSTATION,
     ROOT / "results" / "TUNING.md": SEARCH,
 }
 """Every page and the results, or the folder of archives, that its tables show."""

@@ -18,7 +18,7 @@ from conf import GITHUB, REPOSITORY, UNPUBLISHED
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 RESULTS = ROOT / "results"
-SHOWN = RESULTS / "workstation"
+SHOWN = RESULTS / "reference"
 """The results whose numbers the tables show."""
 HAND_WRITTEN = DOCS / "site" / "pages"
 

@@ -2,12 +2,12 @@
 
 A task without a shipped policy is played by its script.
 
-    python docs/site/gallery.py [--results results/all_methods] [TASK ...]
+    python docs/site/gallery.py [--results results/reference results/all_methods] [TASK ...]
 
 An animation shows the final policy of the first seed on the first two evaluation instances, whatever comes of them,
-side by side. `gallery.json` beside the animations records what each shows. Policies of an earlier version of a task
-cannot play any more: their pictures stay until results of the new version are shipped, and their record says the
-version.
+side by side. Where several results have a policy of a task and a method, the first of them is shown. `gallery.json`
+beside the animations records what each shows. Policies of an earlier version of a task cannot play any more: their
+pictures stay until results of the new version are shipped, and their record says the version.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import argparse
 import csv
 import io
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -46,11 +46,18 @@ END_SECONDS = 1.5
 """Pause at the end, s."""
 
 
-def cells(results: Path) -> Iterator[Path]:
-    """Yield, of each task and method with a policy among `results`, the default cell of the first such seed."""
-    for variant in sorted(results.glob("*/*/default")):
-        found = sorted(seed for seed in variant.glob("seed-*") if (seed / "policy.safetensors").exists())
-        yield from found[:1]
+SHOWN = (ROOT / "results" / "reference", ROOT / "results" / "all_methods")
+"""Results whose policies play."""
+
+
+def cells(folders: Iterable[Path]) -> list[Path]:
+    """Return, of each task and method, the default cell of the first seed with a policy in the first such folder."""
+    found: dict[tuple[str, str], Path] = {}
+    for folder in folders:
+        for policy in sorted(folder.resolve().glob("*/*/default/seed-*/policy.safetensors")):
+            task, method = policy.parts[-5:-3]
+            found.setdefault((task, method), policy.parent)
+    return list(found.values())
 
 
 def draw(task: Task, policy: Behaviour, size: int = EPISODES) -> tuple[list[Image.Image], list[bool], float]:
@@ -95,7 +102,7 @@ def evaluated(cell: Path, count: int = EPISODES) -> list[bool]:
         return [row["success"] == "1" for _, row in zip(range(count), csv.DictReader(file), strict=False)]
 
 
-def shown(cell: Path, results: Path) -> tuple[dict[str, Any], bytes]:
+def shown(cell: Path) -> tuple[dict[str, Any], bytes]:
     """Return the record and the animation of a cell.
 
     Raises:
@@ -109,7 +116,7 @@ def shown(cell: Path, results: Path) -> tuple[dict[str, Any], bytes]:
         "method": record["method"],
         "seed": record["seed"],
         "task_version": record.get("task_version", 1),
-        "cell": cell.relative_to(results.parent).as_posix(),
+        "cell": "/".join(cell.parts[-5:]),
         "solved": solved,
         "as_evaluated": solved == evaluated(cell),
     }
@@ -128,18 +135,18 @@ def main() -> int:
     """Draw the cells of the named tasks, or of all; return the exit code."""
     parser = argparse.ArgumentParser(description="Draw the gallery from shipped policies.")
     parser.add_argument("tasks", nargs="*", metavar="TASK", help="default: all")
-    parser.add_argument("--results", type=Path, default=ROOT / "results" / "all_methods")
+    parser.add_argument("--results", type=Path, nargs="+", default=SHOWN, metavar="DIR")
     options = parser.parse_args()
     path = GALLERY / RECORD
     entries = json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
     known = {(entry["task"], entry["method"]): entry for entry in entries}
     GALLERY.mkdir(parents=True, exist_ok=True)
-    for cell in cells(options.results.resolve()):
+    for cell in cells(options.results):
         task, method = cell.parts[-4:-2]
         if options.tasks and task not in options.tasks:
             continue
         try:
-            entry, content = shown(cell, options.results.resolve())
+            entry, content = shown(cell)
         except UserError as error:
             print(f"left as it is: {task} {method}: {error}")
             continue

@@ -44,7 +44,7 @@ def methods() -> str:
     paper, beyond = (rows[: len(load_study(DEFAULT_STUDY).methods)], rows[len(load_study(DEFAULT_STUDY).methods) :])
     lead = (
         "The last column is the mean over tasks of the [normalised score](docs/reference_points.md#normalised-scores) "
-        "at the end of training in the [shipped results](results/workstation/README.md), with its 95 % interval."
+        "at the end of training in the [shipped results](results/reference/README.md), with its 95 % interval."
     )
     extra = sorted(
         path.stem for path in (ROOT / "docs" / "methods").glob("*.md") if path.stem not in built_in("methods")

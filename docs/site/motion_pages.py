@@ -95,9 +95,9 @@ def gallery() -> str:
         "# Gallery",
         "The final policy of the first seed on the first two evaluation instances of each task, whatever comes of "
         "them. The left and the right half are two episodes with different goals: a method that designs a tool for "
-        "each goal shows two tools, the others show the same tool twice. Policies are from the "
-        "[results of all methods](results/all_methods/README.md); where a picture shows an earlier version of a task, "
-        "from the [reference results](results/reference/README.md).",
+        "each goal shows two tools, the others show the same tool twice. Policies of the "
+        "paper's methods on its tasks are from the [reference results](results/reference/README.md), the others from "
+        "the [results of all methods](results/all_methods/README.md).",
     ]
     for task in built_in("tasks"):
         found = {entry["method"]: entry for entry in entries() if entry["task"] == task}

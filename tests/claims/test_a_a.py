@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from codesign_bench.cell.variant import DEFAULT
 from codesign_bench.claims import comparison
 from codesign_bench.claims.claim import Claim, Rule
 from codesign_bench.claims.evidence import Evidence, load_evidence
@@ -31,9 +32,12 @@ pytestmark = [
 
 @lru_cache
 def shipped() -> Evidence:
-    """Return the shipped cells that vary nothing."""
+    """Return the shipped cells, with the method and the variant in place of the method's name."""
     found = load_evidence(REFERENCE)
-    parts = (frame[frame["variant"] == "default"] for frame in (found.curves, found.evaluations))
+    parts = (
+        frame.assign(method=frame["method"] + "/" + frame["variant"], variant=DEFAULT.name)
+        for frame in (found.curves, found.evaluations)
+    )
     columns = ["task", "method", "variant", "seed", "env_steps", "return_mean", "return", "success", "success_rate"]
     curves, evaluations = (part[[name for name in columns if name in part]] for part in parts)
     keys = ["task", "method", "variant", "seed"]
@@ -42,7 +46,7 @@ def shipped() -> Evidence:
 
 @lru_cache
 def splittable() -> dict[str, dict[str, list[int]]]:
-    """Return, per task, the seeds of the methods that have enough for two halves that rules take."""
+    """Return, per task, the seeds of each method and variant that has enough for two halves that rules take."""
     counted: dict[str, dict[str, list[int]]] = {}
     for (task, method), rows in shipped().evaluations.groupby(["task", "method"]):
         if len(rows) >= 2 * MIN_SEEDS:
@@ -51,7 +55,7 @@ def splittable() -> dict[str, dict[str, list[int]]]:
 
 
 def split(rng: np.random.Generator) -> Evidence:
-    """Return the seeds of one method, drawn anew for each task, as those of two methods."""
+    """Return the seeds of one method and variant, drawn anew for each task, as those of two methods."""
     halves = {}
     for task, methods in splittable().items():
         method = rng.choice(list(methods))

@@ -7,7 +7,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import rgb_to_hsv, to_rgb
 from numpy.typing import NDArray
+
+from codesign_bench.figures.designed_tools import TOOL_COLOUR
 
 Picture: TypeAlias = NDArray[np.uint8]
 """(height, width, 3) in RGB."""
@@ -18,19 +21,31 @@ MOST_CUT = 0.3
 """Largest fraction of a picture's width or height that is cut off; more would make pixels visible."""
 SAME = 12
 """Colours count as equal if every channel differs by less than this; rendering is not exact."""
+SAME_HUE, LEAST_SATURATION = 0.04, 0.3
+"""Of a tool's pixels; hues are from 0 to 1."""
 FRAME_COLOUR, FRAME_WIDTH = "#999999", 0.5
 
 
 def cut_to_differences(pictures: Sequence[Picture], *, aspect: float = 4 / 3) -> list[Picture]:
-    """Crop all pictures to the part in which any of them differs from the first; to the whole if none does.
+    """Crop all pictures to the part in which any of them differs from the first, or shows a tool in the usual colour.
+
+    A tool may be the same in all of them, and nothing else may differ near it. Where there is neither, the whole is
+    kept.
 
     Args:
         pictures: pictures of the same size.
         aspect: width / height of the result, as far as possible.
     """
     stack = np.stack(pictures).astype(np.int16)
-    rows, columns = _box((np.abs(stack - stack[0]).max(axis=-1) > SAME).any(axis=0), aspect)
+    differs = np.abs(stack - stack[0]).max(axis=-1) > SAME
+    rows, columns = _box((differs | _is_tool(stack)).any(axis=0), aspect)
     return [picture[rows, columns] for picture in pictures]
+
+
+def _is_tool(pictures: NDArray[np.int16]) -> NDArray[np.bool_]:
+    """Return which pixels of pictures (..., 3) have the hue of tools; light and shade change the hue little."""
+    hue, saturation, _ = np.moveaxis(rgb_to_hsv(pictures / 255.0), -1, 0)
+    return (np.abs(hue - rgb_to_hsv(to_rgb(TOOL_COLOUR))[0]) < SAME_HUE) & (saturation > LEAST_SATURATION)
 
 
 def cut_to_content(picture: Picture, *, aspect: float = 4 / 3) -> Picture:

@@ -21,10 +21,13 @@ from codesign_bench.task import Box, Floats, Frame, Task, load_task
 from codesign_bench.task.behaviours import GivenDesigns, Idle
 from codesign_bench.task.episodes import Episodes
 from codesign_bench.task.play import designed
+from codesign_bench.task.sketch import Sketch
 
 if TYPE_CHECKING:
     import pandas as pd
 
+TOOL_COLOUR = Sketch.tool_colour
+"""Colour of tools in pictures, unless a task chooses another."""
 MAP_SIDE = 3
 """A map: the ranges of two entries are divided into this many intervals each, with one picture per field."""
 LINE_LENGTH = 8

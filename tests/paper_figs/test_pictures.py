@@ -20,6 +20,15 @@ def test_equal_pictures_are_left_whole() -> None:
     assert cut_to_differences([picture(0, 0), picture(0, 0)])[0].shape == (90, 120, 3)
 
 
+def test_a_tool_that_is_the_same_in_all_pictures_is_not_cut_off() -> None:
+    first, second = picture(20, 20), picture(20, 60)
+    for one in (first, second):
+        one[80:84, 30:34] = [44, 111, 187]
+        one[84:88, 30:34] = [22, 55, 93]  # in shade
+    for cut in cut_to_differences([first, second], aspect=1.0):
+        assert (cut[..., 2] > cut[..., 0]).sum() == 4 * 4 + 4 * 4
+
+
 def test_a_single_picture_keeps_most_of_itself_and_all_of_its_content() -> None:
     cut = cut_to_content(picture(40, 55))
     assert cut.shape == (63, 84, 3)  # 70 % of both

@@ -20,6 +20,8 @@ HERE = Path(__file__).resolve().parent
 SOURCE = HERE.parent / "results" / "reference"
 TARGET = HERE / "codesign_bench_reference" / "reference"
 LEFT_OUT = ("figures", "claims", "*.md", ".*", "*.lock", "*.pdf", "*.png", "*.gif")
+PLANS = "best_known/*.safetensors"
+"""Plans of the best known episodes, of which an archive takes the table alone."""
 ARCHIVE_FILE = "archive.json"
 """The manifest, as `codesign_bench.storage.archive` reads it."""
 
@@ -53,6 +55,8 @@ def put_results_into_package() -> None:
         return
     shutil.rmtree(TARGET, ignore_errors=True)
     shutil.copytree(SOURCE, TARGET, ignore=shutil.ignore_patterns(*LEFT_OUT))
+    for plans in TARGET.glob(PLANS):
+        plans.unlink()
     (TARGET / ARCHIVE_FILE).write_text(json.dumps(manifest(), indent=2) + "\n", encoding="utf-8")
 
 

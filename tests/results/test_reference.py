@@ -93,8 +93,8 @@ def test_nothing_is_above_the_best_known() -> None:
         assert (rows[["return_mean", "success_rate"]] <= best[["return_mean", "success_rate"]]).all(axis=None), task
         assert (instances["task"] == task).sum() == rows["instances"].sum()
     means = instances.groupby(["task", "point"])[["return", "success"]].mean().to_numpy()
-    told = points.set_index(["task", "point"]).sort_index()[["return_mean", "success_rate"]].to_numpy()
-    assert means == pytest.approx(told)
+    stored = points.set_index(["task", "point"]).sort_index()[["return_mean", "success_rate"]].to_numpy()
+    assert means == pytest.approx(stored)
 
 
 def test_the_folder_stays_small() -> None:
@@ -121,13 +121,13 @@ def test_every_shipped_tool_was_tried_equally_often() -> None:
 
 
 @pytest.mark.numeric
-@pytest.mark.parametrize("told", TOOLS_THAT_WORKED.to_dict("records"), ids=lambda told: told["task"])
-def test_a_shipped_policy_succeeds_on_the_panda_as_its_table_says(told: dict[str, Any], tmp_path: Path) -> None:
+@pytest.mark.parametrize("stored", TOOLS_THAT_WORKED.to_dict("records"), ids=lambda stored: stored["task"])
+def test_a_shipped_policy_succeeds_on_the_panda_as_its_table_says(stored: dict[str, Any], tmp_path: Path) -> None:
     cells = {(cell.record.task, cell.record.method, cell.record.seed): cell for cell in DEFAULTS}
-    cell = cells[told["task"], "gnn_ppo", told["policy_seed"]]
-    policy, task = policy_and_task(cell.folder, told["task"])
-    (again,) = deploy(task, policy, Order(TRIAL, tools=(told["tool"],), gifs=False), tmp_path, lambda line: None)
+    cell = cells[stored["task"], "gnn_ppo", stored["policy_seed"]]
+    policy, task = policy_and_task(cell.folder, stored["task"])
+    (again,) = deploy(task, policy, Order(TRIAL, tools=(stored["tool"],), gifs=False), tmp_path, lambda line: None)
     # Another processor rounds otherwise. Under no instruction set did that move a success by a single step; where
     # contact makes more of it, the same course comes to its end a few steps earlier or later.
     assert again["success"] == 1
-    assert again["steps"] == pytest.approx(told["steps"], abs=5)
+    assert again["steps"] == pytest.approx(stored["steps"], abs=5)

@@ -1,8 +1,8 @@
 """Build the package of reference results: setuptools, after the results of the checkout were put into the package.
 
 Only the standard library and setuptools are used, because a build does not have codesign-bench. In a source archive the
-results are in the package already. What goes along is what `codesign-bench pack` takes: cells and the tables beside
-them, no figures and verdicts, which are made of these.
+results are in the package already. What goes along is what `codesign-bench pack` takes: cells and what was
+measured beside them, no figures and verdicts, which are made of these.
 """
 
 from __future__ import annotations
@@ -20,8 +20,6 @@ HERE = Path(__file__).resolve().parent
 SOURCE = HERE.parent / "results" / "reference"
 TARGET = HERE / "codesign_bench_reference" / "reference"
 LEFT_OUT = ("figures", "claims", "*.md", ".*", "*.lock", "*.pdf", "*.png", "*.gif")
-PLANS = "best_known/*.safetensors"
-"""Plans of the best known episodes, of which an archive takes the table alone."""
 ARCHIVE_FILE = "archive.json"
 """The manifest, as `codesign_bench.storage.archive` reads it."""
 
@@ -55,8 +53,6 @@ def put_results_into_package() -> None:
         return
     shutil.rmtree(TARGET, ignore_errors=True)
     shutil.copytree(SOURCE, TARGET, ignore=shutil.ignore_patterns(*LEFT_OUT))
-    for plans in TARGET.glob(PLANS):
-        plans.unlink()
     (TARGET / ARCHIVE_FILE).write_text(json.dumps(manifest(), indent=2) + "\n", encoding="utf-8")
 
 

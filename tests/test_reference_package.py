@@ -77,7 +77,7 @@ def test_the_wheel_has_the_results_and_nothing_else(wheels: list[Path]) -> None:
     for kind in ("cell.json", "curve.csv", "evaluation.csv"):
         assert {f"{cell}/{kind}" for cell in cells} <= data
     assert {path.relative_to(RESULTS).as_posix() for path in RESULTS.rglob("policy.safetensors")} <= data
-    assert "reference_points.csv" in data
+    assert {"reference_points.csv", "best_known/push.csv", "best_known/push.safetensors"} <= data
 
 
 @pytest.mark.slow

@@ -33,7 +33,7 @@ from codesign_bench.storage.layout import (
     POLICY_FILE,
 )
 from codesign_bench.storage.manifest import SCHEMA, Manifest, StoredFile
-from codesign_bench.storage.measurements import ALL
+from codesign_bench.storage.measurements import ALL, BEST_KNOWN_PLANS
 from codesign_bench.storage.reading import (
     JSON_BYTES,
     MEGABYTE,
@@ -48,7 +48,7 @@ from codesign_bench.storage.records import CELL_FILE
 from codesign_bench.storage.tables import TABLE_BYTES
 
 SUFFIX = ".zip"
-POLICY_BYTES = 256 * MEGABYTE
+ARRAY_BYTES = 256 * MEGABYTE
 """As large as a file of arrays may be."""
 ARCHIVE_BYTES, UNPACKED_BYTES = 1024 * MEGABYTE, 2048 * MEGABYTE
 """Largest archive, and most bytes of its files together; the reference results have 73 MB of files."""
@@ -66,13 +66,14 @@ IN_A_CELL = {
     CURVE_FILE: TABLE_BYTES,
     METRICS_FILE: TABLE_BYTES,
     EVALUATION_FILE: TABLE_BYTES,
-    POLICY_FILE: POLICY_BYTES,
+    POLICY_FILE: ARRAY_BYTES,
 }
 """File of a cell -> its largest size."""
 BESIDE_CELLS = {
     MARKER_FILE: JSON_BYTES,
     "deployment/*/protocol*.json": JSON_BYTES,
     **{kind.pattern: TABLE_BYTES for kind in ALL},
+    BEST_KNOWN_PLANS: ARRAY_BYTES,
 }
 """Pattern of a file beside the cells -> its largest size."""
 CELL_FOLDER = "*/*/*/seed-*"

@@ -204,6 +204,8 @@ BEST_KNOWN_EPISODES = Measurements(
         unique=("success", "instance"),
     ),
 )
+BEST_KNOWN_PLANS = "best_known/*.safetensors"
+"""Pattern of the files with the plans that the tables of the best known episodes name."""
 ALL = (
     REFERENCE_POINTS,
     REFERENCE_INSTANCES,

@@ -7,16 +7,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from builders import VERSION_0_1_0, rising, store_cell, store_table
 from codesign_bench.cell.variant import Variant
 from codesign_bench.errors import UserError
 from codesign_bench.sharing.pack import Order, pack, spent_on_tuning
-from codesign_bench.storage.archive import check_archive
+from codesign_bench.storage.archive import check_archive, unpack
+from codesign_bench.storage.best_known import BestKnown, Episode, load_best_known, store
 from codesign_bench.storage.frames import load_results
 from codesign_bench.storage.measurements import DESIGN_SENSITIVITY, REFERENCE_POINTS
 from codesign_bench.storage.records import RUNNING
+from toy import ToyReach
 
 CODE: Mapping[str, Any] = {"version": "0.2.0", "commit": "a" * 40, "changed": False, "fingerprint": "f"}
 
@@ -51,6 +54,18 @@ def test_an_archive_describes_itself(runs: Path, tmp_path: Path) -> None:
         "left out: push/gnn_ppo/default/seed-02: it is interrupted",
     ]
     assert sorted(load_results(out)["seed"].unique()) == [0, 1]
+
+
+def test_best_known_episodes_keep_their_plans(tmp_path: Path) -> None:
+    runs, task, known = tmp_path / "runs", ToyReach(), BestKnown()
+    store_cell(runs, curve=rising(0.0, 1.0))
+    known.offer(Episode(0, 2.0, True, 5, "a cell", np.linspace(0.0, 1.0, 6, dtype=np.float32)))
+    store(runs, task, known)
+    pack(runs, tmp_path / "mine.zip", Order(), lambda line: None)
+    unpack(tmp_path / "mine.zip", tmp_path / "back")
+    best = load_best_known(tmp_path / "back", task).best(0)
+    assert best is not None
+    np.testing.assert_array_equal(best.plan, np.linspace(0.0, 1.0, 6, dtype=np.float32))
 
 
 def test_a_brief_archive_has_what_the_leaderboard_needs(tmp_path: Path) -> None:

@@ -30,6 +30,7 @@ from codesign_bench.registry import built_in, in_order, load_module
 from codesign_bench.sharing.leaderboard import leaderboard
 from codesign_bench.stats import final_values, welch_across
 from codesign_bench.storage.frames import stored_curves
+from codesign_bench.storage.layout import CURVE_COLUMNS
 from codesign_bench.storage.reference_points import FILE, POINTS, load_reference_points, with_reference_points
 from codesign_bench.study import DEFAULT_STUDY, load_study
 from codesign_bench.text_tables import markdown
@@ -39,6 +40,7 @@ from codesign_bench.tuning.scores import mean_ranks
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "results" / "reference"
 ALL_METHODS = ROOT / "results" / "all_methods"
+SECOND_MACHINE = ROOT / "results" / "second_machine"
 SUBMISSIONS = ROOT / "results" / "submissions"
 SEARCH = ROOT / "results" / "search"
 PLATEAU = ROOT / "results" / "plateau"
@@ -49,6 +51,7 @@ PAGES = {
     ROOT / "docs" / "leaderboard.md": SUBMISSIONS,
     REFERENCE / "README.md": REFERENCE,
     ALL_METHODS / "README.md": ALL_METHODS,
+    SECOND_MACHINE / "README.md": SECOND_MACHINE,
     ROOT / "results" / "TUNING.md": SEARCH,
 }
 """Every page and the results, or the folder of archives, that its tables show."""
@@ -140,6 +143,21 @@ def _credit(results: Path) -> str:
         if len(added) > 1:
             lines.append([f"`{method}`", f"mean of {len(added)} tasks", "", "", _difference(added)])
     return markdown(["method", "task", "joint credit", "separate credit", "separate credit adds"], lines)
+
+
+def _machines(results: Path) -> str:
+    """Return each seed's success in the reference results and in `results`, and how many curves are the same."""
+    cell, lines = ["task", "method", "variant", "seed"], []
+    sides = [
+        _curves(folder).set_index(cell)[[*CURVE_COLUMNS]].drop(columns="wall_s") for folder in (REFERENCE, results)
+    ]
+    for task, method in sides[1].index.droplevel(["variant", "seed"]).unique():
+        there, here = (side.loc[(task, method, DEFAULT.name)] for side in sides)
+        seeds = sorted({*there.index} & {*here.index})
+        samples = [side.groupby("seed")["success_rate"].last().loc[seeds].to_numpy() for side in (there, here)]
+        same = sum(there.loc[[seed]].equals(here.loc[[seed]]) for seed in seeds)
+        lines.append([task.replace("_", " "), f"`{method}`", *map(_seeds, samples), f"{same} of {len(seeds)}"])
+    return markdown(["task", "method", "reference results", "here", "curves equal to the bit"], lines)
 
 
 def _successes(results: Path, sides: Sequence[tuple[str, Variant]]) -> dict[str, list[np.ndarray]]:
@@ -243,6 +261,7 @@ MAKERS: dict[str, Callable[[Path], str]] = {
     "script": _script,
     "response": _response,
     "credit": _credit,
+    "machines": _machines,
     "search": _search,
     "leaderboard": lambda folder: leaderboard(folder, "../results/submissions"),
     "budgets": lambda _: _budgets(),

@@ -26,13 +26,12 @@ from codesign_bench.storage.arrays import load_arrays, save_arrays
 from codesign_bench.storage.files import saying_why
 from codesign_bench.storage.layout import open_folder
 from codesign_bench.storage.locks import locked
-from codesign_bench.storage.measurements import BEST_KNOWN_EPISODES
+from codesign_bench.storage.measurements import BEST_KNOWN_EPISODES, PLANS_SUFFIX
 from codesign_bench.storage.reading import DamagedFile
 from codesign_bench.storage.tables import read_table, write_table
 from codesign_bench.task import Singles, Task
 from codesign_bench.task.plans import designs_of, plan_size
 
-FOLDER = "best_known"
 LOCK_SECONDS = 60.0
 """Longest wait for another process that is writing a table."""
 
@@ -95,7 +94,7 @@ class BestKnown:
 
 def path_of(results: Path, task_name: str) -> Path:
     """Return the path of the table of a task below `results`."""
-    return results / FOLDER / f"{task_name}.csv"
+    return results / BEST_KNOWN_EPISODES.pattern.replace("*", task_name)
 
 
 def load_best_known(results: Path, task: Task) -> BestKnown:
@@ -108,7 +107,7 @@ def load_best_known(results: Path, task: Task) -> BestKnown:
     table = read_table(path, BEST_KNOWN_EPISODES.form)
     if table is None or set(table["task_version"]) != {task.version}:
         return BestKnown()
-    plans = _plans(path.with_suffix(".safetensors"))
+    plans = _plans(path.with_suffix(PLANS_SUFFIX))
     size, count = plan_size(task), task.num_evaluation_instances
     known = BestKnown()
     for row in table.to_dict("records"):
@@ -129,6 +128,7 @@ def store(results: Path, task: Task, known: BestKnown) -> None:
         UserError: the folder is not writable, or a file in it cannot be used.
     """
     path = path_of(results, task.name)
+    plans_path = path.with_suffix(PLANS_SUFFIX)
     open_folder(results)
     with saying_why(f"--results {results}", path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -139,12 +139,12 @@ def store(results: Path, task: Task, known: BestKnown) -> None:
             plans = {episode.name: episode.plan for episode in _episodes(known)}
             former = {episode.name: episode.plan for episode in _episodes(before)}
             # The table never names a plan that is not there: new plans come before it, and former ones go after it.
-            with saying_why(f"--results {results}", path.with_suffix(".safetensors")):
-                save_arrays(path.with_suffix(".safetensors"), {**former, **plans}, _header(task))
+            with saying_why(f"--results {results}", plans_path):
+                save_arrays(plans_path, {**former, **plans}, _header(task))
             write_table(results, path, _table(task, known))
             if set(former) - set(plans):
-                with saying_why(f"--results {results}", path.with_suffix(".safetensors")):
-                    save_arrays(path.with_suffix(".safetensors"), plans, _header(task))
+                with saying_why(f"--results {results}", plans_path):
+                    save_arrays(plans_path, plans, _header(task))
     except filelock.Timeout:
         raise UserError(f"--results {results}: another process holds the lock of {path.parent}") from None
 

@@ -12,7 +12,7 @@ OUT/design_values/<task>-<method>[-<variant>]-seed-00.csv  tools as a policy jud
 
 from __future__ import annotations
 
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 from codesign_bench.storage.reading import UnusableFile
@@ -204,8 +204,10 @@ BEST_KNOWN_EPISODES = Measurements(
         unique=("success", "instance"),
     ),
 )
-BEST_KNOWN_PLANS = "best_known/*.safetensors"
-"""Pattern of the files with the plans that the tables of the best known episodes name."""
+PLANS_SUFFIX = ".safetensors"
+"""Ending of the file with the plans that a table of best known episodes names, which lies beside the table."""
+BEST_KNOWN_PLANS = str(PurePosixPath(BEST_KNOWN_EPISODES.pattern).with_suffix(PLANS_SUFFIX))
+"""Pattern of these files."""
 ALL = (
     REFERENCE_POINTS,
     REFERENCE_INSTANCES,

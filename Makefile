@@ -34,6 +34,7 @@ METHOD ?= all
 SEEDS ?= 6
 PROFILE ?= quick
 REFERENCE := results/reference
+SECOND := results/second_machine
 SUBMISSION := results/submissions/codesign-bench.zip
 
 # How the numerical libraries are made to compute as on processors without newer instructions. In turn: torch's own
@@ -74,6 +75,7 @@ renew: .venv/installed ## after cells were added to the reference results: best 
 	$(BIN)/codesign-bench headroom --update --candidates 0 --results $(REFERENCE)
 	$(BIN)/codesign-bench verify --measure --results $(REFERENCE) --out $(REFERENCE)/claims
 	$(BIN)/codesign-bench plot --results $(REFERENCE) --out $(REFERENCE)/figures
+	$(BIN)/codesign-bench verify --results $(SECOND) --compare $(REFERENCE) --out $(SECOND)/agreement
 	rm -f $(SUBMISSION)
 	$(BIN)/codesign-bench pack $(REFERENCE) --brief --out $(SUBMISSION) --title "reference results" \
 		--by "the codesign-bench authors" --tuning "mostly with gnn_ppo; steps per method in results/TUNING.md" \

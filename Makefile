@@ -75,6 +75,7 @@ renew: .venv/installed ## after cells were added to the reference results: best 
 	$(BIN)/codesign-bench headroom --update --candidates 0 --results $(REFERENCE)
 	$(BIN)/codesign-bench verify --measure --results $(REFERENCE) --out $(REFERENCE)/claims
 	$(BIN)/codesign-bench plot --results $(REFERENCE) --out $(REFERENCE)/figures
+	$(BIN)/codesign-bench plot generalization --results $(REFERENCE) --out $(REFERENCE)/figures  # by name: plays around the region
 	$(BIN)/codesign-bench verify --results $(SECOND) --compare $(REFERENCE) --out $(SECOND)/agreement
 	rm -f $(SUBMISSION)
 	$(BIN)/codesign-bench pack $(REFERENCE) --brief --out $(SUBMISSION) --title "reference results" \

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from codesign_bench import stats
 from codesign_bench.claims.claim import Claim
 from codesign_bench.claims.evidence import Evidence
-from codesign_bench.claims.finding import NOT_ASKED, UNDECIDED, Finding, InsufficientData, probability
+from codesign_bench.claims.finding import NOT_ASKED, UNDECIDED, Finding, InsufficientData, joined, probability
 from codesign_bench.config.profiles import DEFAULT_PROFILE
 from codesign_bench.seeding import TUNING_SEEDS, generator
 
@@ -31,11 +31,20 @@ class Row:
     """Commands that produce missing data; empty if none are missing."""
     further_seeds: str = ""
     """Command that adds seeds where the first look left the claim undecided; empty if it asks for none."""
+    awaits: tuple[str, ...] = ()
+    """Tasks of a claim with several looks on which seeds of the last one are missing: its verdict is not final."""
 
     @property
     def asked(self) -> bool:
         """Whether there are results of every task of the claim."""
         return self.finding.verdict != NOT_ASKED
+
+    @property
+    def note(self) -> str:
+        """The remark on the finding, and that a verdict with a p-value is not final while seeds are missing."""
+        if not self.awaits or math.isnan(self.finding.p):
+            return self.finding.note
+        return joined(self.finding.note, f"not final: seeds of the last look are missing on {', '.join(self.awaits)}")
 
     @property
     def interval(self) -> str:
@@ -64,7 +73,12 @@ def judge(claims: Sequence[Claim], evidence: Evidence, results: str) -> list[Row
         results: the folder in commands for missing data.
     """
     rows = adjusted([_row(claim, evidence, results) for claim in claims])
-    return [replace(row, further_seeds=_further_seeds(row, evidence, results)) for row in rows]
+    rows = [replace(row, further_seeds=_further_seeds(row, evidence, results)) for row in rows]
+    # Seeds that one claim asks for are data of every claim about the task, so all of these are judged again. Until then
+    # they may be read more often than their looks count, above all a claim over several tasks whose seeds come one task
+    # after another.
+    open_tasks = {task for row in rows if row.further_seeds for task in row.claim.tasks}
+    return [replace(row, awaits=_awaits(row, open_tasks)) for row in rows]
 
 
 def adjusted(rows: Sequence[Row]) -> list[Row]:
@@ -108,6 +122,11 @@ def missing(rows: Sequence[Row]) -> list[str]:
 def further_seeds(rows: Sequence[Row]) -> list[str]:
     """Return the commands that add seeds for a second look, without duplicates."""
     return list(dict.fromkeys(row.further_seeds for row in rows if row.further_seeds))
+
+
+def _awaits(row: Row, open_tasks: Collection[str]) -> tuple[str, ...]:
+    """Return the tasks of a claim with several looks that wait for seeds of the last one."""
+    return tuple(task for task in row.claim.tasks if task in open_tasks) if row.claim.looks > 1 else ()
 
 
 def _further_seeds(row: Row, evidence: Evidence, results: str) -> str:

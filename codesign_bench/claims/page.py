@@ -91,9 +91,10 @@ def entry(row: Row) -> dict[str, Any]:
         "p_adjusted": _json_number(row.finding.p_adjusted),
         "family_size": row.finding.family_size,
         "n": row.finding.n,
-        "note": row.finding.note,
+        "note": row.note,
         "needs": list(row.needs),
         "further_seeds": row.further_seeds,
+        "awaits": list(row.awaits),
     }
 
 
@@ -153,7 +154,7 @@ def _claims_table(rows: Sequence[Row]) -> str:
             row.finding.n,
             row.claim.rule.kind,
             row.claim.source,
-            "; ".join(filter(None, [row.finding.note, *(f"needs: `{command}`" for command in row.needs)])),
+            "; ".join(filter(None, [row.note, *(f"needs: `{command}`" for command in row.needs)])),
         )
         for row in rows
     ]
@@ -176,9 +177,7 @@ def _by_rule(rows: Sequence[Row], mark: str) -> list[tuple[str, ...]]:
 def contradicted(rows: Sequence[Row]) -> str:
     """Return a Markdown list of the claims that the results contradict, with their findings."""
     lines = [
-        plain_markdown(
-            f"- {row.claim.sentence}: {row.interval} ({'; '.join(filter(None, (row.finding.n, row.finding.note)))})"
-        )
+        plain_markdown(f"- {row.claim.sentence}: {row.interval} ({'; '.join(filter(None, (row.finding.n, row.note)))})")
         for row in rows
         if row.finding.verdict == CONTRADICTED
     ]

@@ -97,8 +97,7 @@ def print_rows(rows: Sequence[Row], console: Console) -> None:
     log = printer(console)
     ordered = sorted((row for row in rows if row.asked), key=lambda row: (bool(row.needs), row.claim.check_of_scene))
     table = [
-        (row.finding.verdict, row.claim.name, row.interval, *row.p_values, row.finding.n, row.finding.note)
-        for row in ordered
+        (row.finding.verdict, row.claim.name, row.interval, *row.p_values, row.finding.n, row.note) for row in ordered
     ]
     print_table(console, ("verdict", "claim", STATISTIC, *P_VALUES, "n", "note"), table)
     log(summary(rows))

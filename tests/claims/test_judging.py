@@ -194,6 +194,29 @@ def test_what_the_first_look_leaves_open_asks_for_further_seeds(
         assert command in as_markdown(rows, study_of([comparison]), Path("here"))
 
 
+def test_a_verdict_is_not_final_while_seeds_of_the_last_look_are_missing() -> None:
+    cells = [
+        (task, method, seed)
+        for task, count in (("push", 5), ("scoop", 10))
+        for method in ("gnn_ppo", "cma_rl")
+        for seed in range(100, 100 + count)
+    ]
+    frame = pd.DataFrame(cells, columns=["task", "method", "seed"]).assign(variant="default")
+    asks = replace(
+        claim("asks", Finding(UNDECIDED, 0.1, -0.5, 0.7, p=0.5)), tasks=("push",), adds_seeds_of=("gnn_ppo", "cma_rl")
+    )
+    over_both = claim("over both", Finding(SUPPORTED, 1.0, 0.5, 1.5, p=0.001, note="clear"))
+    over_both = replace(over_both, tasks=("push", "scoop"), looks=2)
+    read_once = replace(over_both, name="read once", looks=1)
+    elsewhere = replace(over_both, name="elsewhere", tasks=("scoop",))
+    rows = judge([asks, over_both, read_once, elsewhere], Evidence(evaluations=frame), "here")
+    assert [row.awaits for row in rows[1:]] == [("push",), (), ()]
+    assert rows[1].note == "clear; not final: seeds of the last look are missing on push"
+    assert rows[1].note in as_markdown(rows, study_of([]), Path("here"))
+    assert [row.note for row in rows[2:]] == ["clear", "clear"]
+    assert [entry["awaits"] for entry in as_json(rows, study_of([]), Path("here"))["claims"][1:]] == [["push"], [], []]
+
+
 def test_seeds_that_tuning_may_have_used_are_never_added() -> None:
     cells = [(method, seed) for method in ("gnn_ppo", "cma_rl") for seed in range(6)]
     frame = pd.DataFrame(cells, columns=["method", "seed"]).assign(task="push", variant="default")

@@ -11,7 +11,7 @@ import os
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -65,7 +65,13 @@ class Plan:
     """Environment steps of the first rung."""
 
 
-PLANS = {"quick": Plan(18, 10_000), "laptop": Plan(81, 50_000), "paper": Plan(972, 100_000)}
+PLANS = {
+    "quick": Plan(18, 10_000),
+    "laptop": Plan(81, 50_000),
+    "workstation": Plan(243, 100_000),
+    "paper": Plan(972, 100_000),
+}
+"""By profile, from small to large; another profile has the plan of the default one."""
 
 
 def settings_of(count: int) -> list[dict[str, float]]:
@@ -78,55 +84,71 @@ def settings_of(count: int) -> list[dict[str, float]]:
 
 
 def sweep_baseline(results: Path, profile: str, log: Log) -> pd.DataFrame:
-    """Run the sweep unless `results` already has its table; return the table, one row per setting and rung.
+    """Run the sweep and return its table, one row per setting and rung. Finished rungs in `results` are not run again.
 
     Raises:
         UserError: the folder is not writable.
     """
     import pandas as pd
 
-    path = results / FOLDER / f"{TASK}-{profile}.csv"
-    known = read_table(path, FORM)
-    if known is not None:
-        return known
-    plan, rows = PLANS.get(profile, PLANS[DEFAULT_PROFILE]), list[dict[str, Any]]()
-    alive, budget, rung = settings_of(plan.settings), plan.budget, 0
-    while len(alive) > 1:
+    plan_name = profile if profile in PLANS else DEFAULT_PROFILE
+    path = _path(results, plan_name)
+    table = read_table(path, FORM)
+    while not _is_finished(table):
+        rung, alive, budget = _next_rung(table, PLANS[plan_name])
         log(f"{FOLDER}: {len(alive)} settings of {METHOD} with {budget:,} steps each on {TASK}")
         found = Parallel(n_jobs=os.cpu_count() or 1)(delayed(_judge)(setting, budget) for setting in alive)
         order = np.argsort([-value for _, value in found], kind="stable")
         keep = set(order[: len(alive) // REDUCTION].tolist())
-        for index, (setting, (env_steps, value)) in enumerate(zip(alive, found, strict=True)):
-            rows.append(
-                {
-                    "task": TASK,
-                    "rung": rung,
-                    "budget": budget,
-                    **setting,
-                    "paper_best": int(all(setting[name] == swept.best for name, swept in KEYS.items())),
-                    "env_steps": env_steps,
-                    "return_mean": value,
-                    "kept": int(index in keep),
-                }
-            )
-        alive = [alive[index] for index in order if index in keep]
-        budget, rung = budget * REDUCTION, rung + 1
-    table = pd.DataFrame(rows, columns=list(COLUMNS))
-    write_table(results, path, table)
+        rows = [
+            {
+                "task": TASK,
+                "rung": rung,
+                "budget": budget,
+                **setting,
+                "paper_best": int(all(setting[name] == swept.best for name, swept in KEYS.items())),
+                "env_steps": env_steps,
+                "return_mean": value,
+                "kept": int(index in keep),
+            }
+            for index, (setting, (env_steps, value)) in enumerate(zip(alive, found, strict=True))
+        ]
+        ended = pd.DataFrame(rows, columns=list(COLUMNS))
+        table = ended if table is None else pd.concat([table, ended], ignore_index=True)
+        write_table(results, path, table)
     return table
 
 
 def load_sweep(request: Request) -> pd.DataFrame:
-    """Return the table of the largest sweep below the results folder.
+    """Return the table of the largest finished sweep below the results folder.
 
     Raises:
         UserError: there is none.
     """
     for profile in reversed(PLANS):
-        table = read_table(request.results / FOLDER / f"{TASK}-{profile}.csv", FORM)
-        if table is not None:
+        table = read_table(_path(request.results, profile), FORM)
+        if _is_finished(table):
             return table
     raise UserError(f"no sweep in '{request.results}' yet")
+
+
+def _path(results: Path, plan_name: str) -> Path:
+    return results / FOLDER / f"{TASK}-{plan_name}.csv"
+
+
+def _is_finished(table: pd.DataFrame | None) -> TypeGuard[pd.DataFrame]:
+    """Return whether at most one setting is left."""
+    return table is not None and table.loc[table["rung"] == table["rung"].max(), "kept"].sum() <= 1
+
+
+def _next_rung(table: pd.DataFrame | None, plan: Plan) -> tuple[int, list[dict[str, float]], int]:
+    """Return the number of the next rung, its settings, best first, and its budget in environment steps."""
+    if table is None:
+        return 0, settings_of(plan.settings), plan.budget
+    last = table[table["rung"] == table["rung"].max()]
+    kept = last[last["kept"] == 1].sort_values("return_mean", ascending=False, kind="stable")
+    settings = [{name: float(setting[name]) for name in KEYS} for _, setting in kept.iterrows()]
+    return int(last["rung"].iloc[0]) + 1, settings, int(last["budget"].iloc[0]) * REDUCTION
 
 
 def _judge(setting: dict[str, float], budget: int) -> tuple[int, float]:

@@ -74,6 +74,30 @@ def test_a_finished_sweep_is_read_and_not_made_again(swept: tuple[Path, pd.DataF
     assert len(told) == before
 
 
+def test_an_interrupted_sweep_resumes_with_the_next_rung(swept: tuple[Path, pd.DataFrame, list[str]]) -> None:
+    folder, _, told = swept
+    (stored,) = folder.rglob("*.csv")
+    whole = stored.read_bytes()
+    first_rung = stored.read_text().splitlines(keepends=True)[: 1 + 6]
+    stored.write_text("".join(first_rung))
+    with pytest.raises(UserError, match="no sweep in"):
+        load_sweep(Request(folder))
+    told.clear()
+    with parallel_config("sequential"):
+        sweep_baseline(folder, "quick", told.append)
+    assert stored.read_bytes() == whole
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize("profile", ["quick", "workstation", "mine"])
+def test_a_sweep_is_found_whatever_the_profile(profile: str, tmp_path: Path, swept: object) -> None:
+    (stored,) = tmp_path.rglob("*.csv")
+    name = profile if profile in baseline_sweep.PLANS else DEFAULT_PROFILE
+    stored.rename(stored.with_name(f"toy_reach-{name}.csv"))
+    found = sweep_baseline(tmp_path, profile, print)
+    pd.testing.assert_frame_equal(load_sweep(Request(tmp_path)), found)
+
+
 def test_settings_are_different_points_of_the_papers_grid() -> None:
     settings = settings_of(50)
     assert len({tuple(setting.values()) for setting in settings}) == 50

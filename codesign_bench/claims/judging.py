@@ -44,7 +44,8 @@ class Row:
         """The remark on the finding, and that a verdict with a p-value is not final while seeds are missing."""
         if not self.awaits or math.isnan(self.finding.p):
             return self.finding.note
-        return joined(self.finding.note, f"not final: seeds of the last look are missing on {', '.join(self.awaits)}")
+        where = f": seeds are missing on {', '.join(self.awaits)}" if len(self.claim.tasks) > 1 else ""
+        return joined(self.finding.note, f"not final{where}")
 
     @property
     def interval(self) -> str:

@@ -134,7 +134,7 @@ HOW_SURE = (
     "p-values are two-sided. The adjusted ones count each p-value as often as its claim may be judged while seeds are "
     "added, and account by Holm's method for all claims of the same rule, whose number is in brackets; a verdict that "
     f"follows from a test needs one below {LEVEL:g}. Fewer than {stats.MIN_SEEDS} seeds give no interval and decide "
-    "nothing."
+    "nothing. A verdict is not final while seeds of its claim's last look are missing on its tasks."
 )
 SECOND_LOOK = "Seeds for a second look at what is undecided"
 SCENES = (

@@ -211,7 +211,7 @@ def test_a_verdict_is_not_final_while_seeds_of_the_last_look_are_missing() -> No
     elsewhere = replace(over_both, name="elsewhere", tasks=("scoop",))
     rows = judge([asks, over_both, read_once, elsewhere], Evidence(evaluations=frame), "here")
     assert [row.awaits for row in rows[1:]] == [("push",), (), ()]
-    assert rows[1].note == "clear; not final: seeds of the last look are missing on push"
+    assert rows[1].note == "clear; not final: seeds are missing on push"
     assert rows[1].note in as_markdown(rows, study_of([]), Path("here"))
     assert [row.note for row in rows[2:]] == ["clear", "clear"]
     assert [entry["awaits"] for entry in as_json(rows, study_of([]), Path("here"))["claims"][1:]] == [["push"], [], []]

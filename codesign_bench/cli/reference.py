@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 
 from rich.console import Console
 
@@ -19,6 +18,7 @@ from codesign_bench.cli.arguments import (
     tell_work,
 )
 from codesign_bench.console import JsonLines, printer, tell_left_out
+from codesign_bench.machine import available_cores
 
 HELP = "measure reference points: idling, random tools, the script, the best single tool, the best known"
 
@@ -54,7 +54,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     log = printer(console)
     tasks = chosen_tasks(options.task, log)
     tell_left_out(lines(options.results, survey(options.results)))
-    jobs = options.jobs or os.cpu_count() or 1
+    jobs = options.jobs or available_cores()
     if options.dry_run:
         for name in tasks:
             tell_work(console, name, expected_work(options.results, load_task(name), again=options.again, jobs=jobs))

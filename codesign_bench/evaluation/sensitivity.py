@@ -8,7 +8,6 @@ Shapes: `K` tools, `G` goals (evaluation instances), `B` episodes, `I` instance,
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +18,7 @@ from joblib import Parallel, delayed
 from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
+from codesign_bench.machine import available_cores
 from codesign_bench.seeding import generator
 from codesign_bench.storage.measurements import DESIGN_SENSITIVITY, usable
 from codesign_bench.storage.reading import is_there
@@ -114,7 +114,7 @@ def measure_missing(results: Path, tasks: Iterable[str], log: Log) -> None:
             continue
         log(f"{FOLDER}: playing {RANDOM_TOOLS} random tools on {GOALS} goals of {name}; kept in {path}")
         try:
-            table = measure(name, jobs=os.cpu_count() or 1)
+            table = measure(name, jobs=available_cores())
         except UserError as error:
             log(f"{FOLDER}: {name} left out: {error}")
             continue

@@ -7,7 +7,6 @@ instances.
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -22,6 +21,7 @@ from codesign_bench.console import Log
 from codesign_bench.errors import UserError
 from codesign_bench.evaluation.evaluate import evaluate
 from codesign_bench.figures.source import Request
+from codesign_bench.machine import available_cores
 from codesign_bench.method import Problem, load_method
 from codesign_bench.seeding import Streams, generator
 from codesign_bench.storage.tables import Content, Form, read_table, write_table
@@ -97,7 +97,7 @@ def sweep_baseline(results: Path, profile: str, log: Log) -> pd.DataFrame:
     while not _is_finished(table):
         rung, alive, budget = _next_rung(table, PLANS[plan_name])
         log(f"{FOLDER}: {len(alive)} settings of {METHOD} with {budget:,} steps each on {TASK}")
-        found = Parallel(n_jobs=os.cpu_count() or 1)(delayed(_judge)(setting, budget) for setting in alive)
+        found = Parallel(n_jobs=available_cores())(delayed(_judge)(setting, budget) for setting in alive)
         order = np.argsort([-value for _, value in found], kind="stable")
         keep = set(order[: len(alive) // REDUCTION].tolist())
         rows = [

@@ -1,7 +1,7 @@
 """Copy finished cells into results that are shipped: `python results/ship_cells.py RUNS [SHIPPED]`.
 
 What only resuming needs stays behind. Of policies, every seed of the paper's method on the default variant and the
-lowest seed of everything else go along; `--all-policies` takes every one. `--task` takes the cells of some tasks alone,
+lowest seed of everything else go along; `--policies all` takes every one, `--policies none` none. `--task` takes the cells of some tasks alone,
 e.g. those whose seeds are complete. A cell that is there already is left as it is.
 """
 
@@ -24,6 +24,8 @@ REFERENCE = Path(__file__).resolve().parent / "reference"
 """Where cells go unless told otherwise."""
 RECORDS = (CURVE_FILE, METRICS_FILE, EVALUATION_FILE, CELL_FILE)
 """What is shipped of every cell; the file that says it is finished comes last."""
+POLICIES = ALL, SOME, NONE = "all", "some", "none"
+"""Which policies are taken: of every cell, those that `ships_policy` names, or none."""
 
 
 def ships_policy(cell: CellRecord, cells: Iterable[CellRecord]) -> bool:
@@ -38,13 +40,13 @@ def _kind(cell: CellRecord) -> tuple[str, str, Variant]:
     return cell.task, cell.method, cell.variant
 
 
-def ship(runs: Path, shipped: Path, all_policies: bool = False, tasks: Collection[str] | None = None) -> list[Path]:
+def ship(runs: Path, shipped: Path, policies: str = SOME, tasks: Collection[str] | None = None) -> list[Path]:
     """Copy the finished cells of `runs` that `shipped` lacks and return their folders there.
 
     Args:
         runs: results folder.
         shipped: results folder; made if there is none.
-        all_policies: take the policy of every cell.
+        policies: which policies are taken, one of `POLICIES`.
         tasks: names of the tasks whose cells are taken; None: all.
 
     Raises:
@@ -59,7 +61,8 @@ def ship(runs: Path, shipped: Path, all_policies: bool = False, tasks: Collectio
         if (target / CELL_FILE).exists():
             continue
         target.mkdir(parents=True, exist_ok=True)
-        policy = (POLICY_FILE,) if all_policies or ships_policy(cell.record, records) else ()
+        takes_policy = policies == ALL or (policies == SOME and ships_policy(cell.record, records))
+        policy = (POLICY_FILE,) if takes_policy else ()
         for name in (*policy, *RECORDS):
             shutil.copyfile(cell.folder / name, target / name)
         copied.append(target)
@@ -71,11 +74,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("runs", type=Path, metavar="RUNS")
     parser.add_argument("shipped", type=Path, metavar="SHIPPED", nargs="?", default=REFERENCE)
-    parser.add_argument("--all-policies", action="store_true")
+    parser.add_argument("--policies", choices=POLICIES, default=SOME)
     parser.add_argument("--task", nargs="+", metavar="T")
     arguments = parser.parse_args()
     try:
-        copied = ship(arguments.runs, arguments.shipped, arguments.all_policies, arguments.task)
+        copied = ship(arguments.runs, arguments.shipped, arguments.policies, arguments.task)
     except UserError as error:
         print(error, file=sys.stderr)
         return 2

@@ -59,8 +59,13 @@ def test_records_go_along_and_the_policies_that_are_shipped(runs: Path, tmp_path
 
 
 def test_every_policy_goes_along_on_demand(runs: Path, tmp_path: Path) -> None:
-    assert ship(runs, tmp_path / "shipped", "--all-policies").returncode == 0
+    assert ship(runs, tmp_path / "shipped", "--policies", "all").returncode == 0
     assert files(tmp_path / "shipped" / BASELINE) == {*RECORDS, "policy.safetensors"}
+
+
+def test_policies_stay_behind_on_demand(runs: Path, tmp_path: Path) -> None:
+    assert ship(runs, tmp_path / "shipped", "--policies", "none").returncode == 0
+    assert files(tmp_path / "shipped" / FIRST) == RECORDS
 
 
 def test_tasks_go_along_one_by_one(runs: Path, tmp_path: Path) -> None:

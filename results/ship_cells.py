@@ -1,8 +1,8 @@
 """Copy finished cells into results that are shipped: `python results/ship_cells.py RUNS [SHIPPED]`.
 
 What only resuming needs stays behind. Of policies, every seed of the paper's method on the default variant and the
-lowest seed of everything else go along; `--policies all` takes every one, `--policies none` none. `--task` takes the cells of some tasks alone,
-e.g. those whose seeds are complete. A cell that is there already is left as it is.
+lowest seed of everything else go along; `--policies all` takes every one, `--policies none` none. `--task` takes the
+cells of some tasks alone, e.g. those whose seeds are complete. A cell that is there already is left as it is.
 """
 
 from __future__ import annotations

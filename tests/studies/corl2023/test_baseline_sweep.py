@@ -98,6 +98,15 @@ def test_a_sweep_is_found_whatever_the_profile(profile: str, tmp_path: Path, swe
     pd.testing.assert_frame_equal(load_sweep(Request(tmp_path)), found)
 
 
+def test_another_task_has_a_table_of_its_own(swept: tuple[Path, pd.DataFrame, list[str]]) -> None:
+    folder, table, told = swept
+    with parallel_config("sequential"):
+        other = sweep_baseline(folder, "quick", told.append, task="push")
+    assert set(other["task"]) == {"push"}
+    assert sorted(path.name for path in folder.rglob("*.csv")) == ["push-quick.csv", "toy_reach-quick.csv"]
+    pd.testing.assert_frame_equal(load_sweep(Request(folder)), table)
+
+
 def test_settings_are_different_points_of_the_papers_grid() -> None:
     settings = settings_of(50)
     assert len({tuple(setting.values()) for setting in settings}) == 50

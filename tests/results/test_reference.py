@@ -79,7 +79,7 @@ def test_the_shipped_claims_are_those_of_the_shipped_results(tmp_path: Path) -> 
 
 
 def test_the_shipped_figures_show_the_shipped_cells(tmp_path: Path) -> None:
-    names = ["learning_curves", "final_results", "fine_tuning"]
+    names = ["learning_curves", "final_results", "fine_tuning", "baseline_sweep"]
     assert main(["plot", *names, "--results", str(REFERENCE), "--out", str(tmp_path)]) == 0
     for name in names:
         made, shipped = (pd.read_csv(folder / f"{name}.csv") for folder in (tmp_path, REFERENCE / "figures"))

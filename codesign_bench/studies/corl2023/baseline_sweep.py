@@ -93,7 +93,7 @@ def sweep_baseline(results: Path, profile: str, log: Log, task: str | None = Non
     Args:
         results: results folder that has, or gets, the table.
         profile: size of the sweep.
-        log: is told of every rung.
+        log: called with one line before every rung.
         task: name of the task; None: `TASK`, the one of the figure.
 
     Raises:

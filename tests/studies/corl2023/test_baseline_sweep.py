@@ -25,12 +25,12 @@ BUDGET = 600
 
 @pytest.fixture
 def swept(toy: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, pd.DataFrame, list[str]]:
-    """A small sweep on the toy task: the results folder, the table and what was said."""
+    """A small sweep on the toy task: the results folder, the table and the messages."""
     monkeypatch.setattr(baseline_sweep, "TASK", "toy_reach")
     monkeypatch.setitem(baseline_sweep.PLANS, "quick", Plan(settings=6, budget=BUDGET))
-    told: list[str] = []
+    messages: list[str] = []
     with parallel_config("sequential"):  # Other processes would sweep on push.
-        return tmp_path, sweep_baseline(tmp_path, "quick", told.append), told
+        return tmp_path, sweep_baseline(tmp_path, "quick", messages.append), messages
 
 
 def trained(setting: dict[str, float], budget: int) -> tuple[int, float]:
@@ -67,26 +67,26 @@ def test_a_setting_is_judged_by_what_training_with_it_gives(swept: tuple[Path, p
 
 
 def test_a_finished_sweep_is_read_and_not_made_again(swept: tuple[Path, pd.DataFrame, list[str]]) -> None:
-    folder, table, told = swept
-    before = len(told)
-    for again in (load_sweep(Request(folder)), sweep_baseline(folder, "quick", told.append)):
+    folder, table, messages = swept
+    before = len(messages)
+    for again in (load_sweep(Request(folder)), sweep_baseline(folder, "quick", messages.append)):
         pd.testing.assert_frame_equal(again, table)
-    assert len(told) == before
+    assert len(messages) == before
 
 
 def test_an_interrupted_sweep_resumes_with_the_next_rung(swept: tuple[Path, pd.DataFrame, list[str]]) -> None:
-    folder, _, told = swept
+    folder, _, messages = swept
     (stored,) = folder.rglob("*.csv")
     whole = stored.read_bytes()
     first_rung = stored.read_text().splitlines(keepends=True)[: 1 + 6]
     stored.write_text("".join(first_rung))
     with pytest.raises(UserError, match="no sweep in"):
         load_sweep(Request(folder))
-    told.clear()
+    messages.clear()
     with parallel_config("sequential"):
-        sweep_baseline(folder, "quick", told.append)
+        sweep_baseline(folder, "quick", messages.append)
     assert stored.read_bytes() == whole
-    assert len(told) == 1
+    assert len(messages) == 1
 
 
 @pytest.mark.parametrize("profile", ["quick", "workstation", "mine"])
@@ -99,9 +99,9 @@ def test_a_sweep_is_found_whatever_the_profile(profile: str, tmp_path: Path, swe
 
 
 def test_another_task_has_a_table_of_its_own(swept: tuple[Path, pd.DataFrame, list[str]]) -> None:
-    folder, table, told = swept
+    folder, table, messages = swept
     with parallel_config("sequential"):
-        other = sweep_baseline(folder, "quick", told.append, task="push")
+        other = sweep_baseline(folder, "quick", messages.append, task="push")
     assert set(other["task"]) == {"push"}
     assert sorted(path.name for path in folder.rglob("*.csv")) == ["push-quick.csv", "toy_reach-quick.csv"]
     pd.testing.assert_frame_equal(load_sweep(Request(folder)), table)
